@@ -1,0 +1,170 @@
+"""From a kinematics file in the units of the printed tables to chains in metres and radians."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+import math
+from pathlib import Path
+
+import numpy as np
+
+from icub_leg_fk.kinematics.link import JOINT_TYPES, DHLink
+from icub_leg_fk.kinematics.rotation import Array, is_rigid_transform
+from icub_leg_fk.kinematics.yaml_fields import Field, read_yaml
+
+_LENGTHS = {'mm': 1e-3, 'm': 1.0}
+_ANGLES = {'deg': math.pi / 180, 'rad': 1.0}
+
+
+@dataclass(frozen=True)
+class TipFrame:
+    """A frame in which the tip's pose can be given: its frame id and its place on the tip."""
+
+    frame: str
+    T_dh_tip: Array
+
+
+@dataclass(frozen=True)
+class ChainVersion:
+    """What differs between the versions of one chain; lengths [m], angles [rad]."""
+
+    T_root_0: Array
+    links: tuple[DHLink, ...]
+    virtual_link: DHLink | None
+    T_n_tip: Array
+    source: str
+
+
+@dataclass(frozen=True)
+class ChainEntry:
+    """A chain of the file with all its versions."""
+
+    name: str
+    tip: str
+    root_frame: str
+    joint_names: tuple[str, ...]
+    tip_frames: Mapping[str, TipFrame]
+    versions: Mapping[str, ChainVersion]
+
+
+@dataclass(frozen=True)
+class _Units:
+    length: str
+    angle: str
+
+    def metres(self, field: Field) -> float:
+        # Dividing, unlike multiplying by 1e-3, gives the float nearest to the printed value.
+        value = field.number(self.length)
+        return value / 1000.0 if self.length == 'mm' else value
+
+    def radians(self, field: Field) -> float:
+        value = field.number(self.angle)
+        return math.radians(value) if self.angle == 'deg' else value
+
+    def transform(self, field: Field) -> Array:
+        rows = field.items('4 rows of 4 numbers', 4)
+        T = np.array([[number.number() for number in row.items('a row of 4 numbers', 4)]
+                      for row in rows])
+        if self.length == 'mm':
+            T[:3, 3] /= 1000.0
+        if not is_rigid_transform(T):
+            field.fail('a rotation, a translation and the last row 0 0 0 1', 'no rigid transform')
+        return T
+
+
+def read_catalog_file(path: str | Path) -> dict[str, ChainEntry]:
+    """Return the chains of a kinematics file by name.
+
+    Raises:
+        CatalogError: the first mistake in the file.
+    """
+    top = read_yaml(path).record(('units', 'chains'))
+    unit_fields = top['units'].record(('length', 'angle'))
+    units = _Units(unit_fields['length'].choice(tuple(_LENGTHS)),
+                   unit_fields['angle'].choice(tuple(_ANGLES)))
+    chains = top['chains'].mapping('chains by name', lambda name: f'chain {name}')
+    if not chains:
+        top['chains'].fail('at least one chain', 'none')
+    entries = {name: _chain(name, field, units) for name, field in chains.items()}
+    _refuse_shared_tips(entries, chains)
+    return entries
+
+
+def _refuse_shared_tips(entries: dict[str, ChainEntry], fields: dict[str, Field]) -> None:
+    owners: dict[str, str] = {}
+    for name, entry in entries.items():
+        owner = owners.setdefault(entry.tip, name)
+        if owner != name:
+            fields[name].fail('a tip of its own', f'tip {entry.tip} of chain {owner}')
+
+
+def _chain(name: str, field: Field, units: _Units) -> ChainEntry:
+    if not name.replace('_', 'a').isalnum() or name[0].isdigit():
+        field.fail('a chain name of letters, digits and _', repr(name))
+    fields = field.record(('tip', 'root_frame', 'joints', 'tip_frames', 'versions'))
+    joints = tuple(item.name('a joint name') for item in fields['joints'].items('joint names'))
+    for joint in joints:
+        if joints.count(joint) > 1:
+            fields['joints'].fail('each joint once', f'{joint!r} twice')
+    versions = fields['versions'].mapping(
+        'versions by name', lambda version: f'chain {name}, version {version}')
+    if not versions:
+        fields['versions'].fail('at least one version', 'none')
+    return ChainEntry(
+        name=name,
+        tip=fields['tip'].name('a name', r'[A-Za-z][A-Za-z0-9_]*'),
+        root_frame=fields['root_frame'].name('a frame id'),
+        joint_names=joints,
+        tip_frames=_tip_frames(fields['tip_frames'], units),
+        versions={version: _version(at, len(joints), units) for version, at in versions.items()},
+    )
+
+
+def _tip_frames(field: Field, units: _Units) -> dict[str, TipFrame]:
+    frames = {}
+    for name, value in field.record(('dh',), ('sole',)).items():
+        optional = ('transform',) if name != 'dh' else ()
+        fields = value.record(('frame',), optional)
+        T = units.transform(fields['transform']) if 'transform' in fields else np.eye(4)
+        frames[name] = TipFrame(fields['frame'].name('a frame id'), T)
+    return frames
+
+
+def _version(field: Field, n_joints: int, units: _Units) -> ChainVersion:
+    fields = field.record(('T_Ro0', 'links'), ('virtual_link', 'T_nIs', 'source'))
+    kind = f'{n_joints} rows, one per joint'
+    rows = [
+        Field(row.file, f'{field.where}, row {i}', row.node)
+        for i, row in enumerate(fields['links'].items(kind, n_joints))
+    ]
+    virtual = fields.get('virtual_link')
+    return ChainVersion(
+        T_root_0=units.transform(fields['T_Ro0']),
+        links=tuple(_link(row, units) for row in rows),
+        virtual_link=None if virtual is None else _virtual_link(virtual, units),
+        T_n_tip=units.transform(fields['T_nIs']) if 'T_nIs' in fields else np.eye(4),
+        source=fields['source'].text() if 'source' in fields else '',
+    )
+
+
+def _link(row: Field, units: _Units) -> DHLink:
+    fields = row.record(('a', 'd', 'alpha', 'offset'), ('range', 'type', 'erratum'))
+    joint_type = fields['type'].choice(JOINT_TYPES) if 'type' in fields else 'revolute'
+    lower, upper = -math.inf, math.inf
+    if 'range' in fields:
+        convert = units.metres if joint_type == 'prismatic' else units.radians
+        lower, upper = map(convert, fields['range'].items('[lower, upper]', 2))
+        if lower > upper:
+            fields['range'].fail('lower <= upper', 'lower > upper')
+    return DHLink(
+        a=units.metres(fields['a']), d=units.metres(fields['d']),
+        alpha=units.radians(fields['alpha']), offset=units.radians(fields['offset']),
+        joint_type=joint_type, lower=lower, upper=upper,
+        erratum=fields['erratum'].text() if 'erratum' in fields else '')
+
+
+def _virtual_link(row: Field, units: _Units) -> DHLink:
+    fields = row.record(('a', 'd', 'alpha', 'offset'))
+    return DHLink(a=units.metres(fields['a']), d=units.metres(fields['d']),
+                  alpha=units.radians(fields['alpha']), offset=units.radians(fields['offset']))

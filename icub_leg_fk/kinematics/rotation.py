@@ -1,0 +1,102 @@
+"""Rotations: unit quaternions in ROS order (x, y, z, w) with w >= 0, and exact right angles."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+_QUADRANTS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
+
+
+def cos_sin(angle: float) -> tuple[float, float]:
+    """Return cosine and sine of an angle [rad], exact at every multiple of a right angle.
+
+    DH tables are full of right angles; cos(pi/2) must be 0 there and not 6e-17.
+    """
+    quarter_turns = angle / (math.pi / 2)
+    nearest = round(quarter_turns)
+    if abs(quarter_turns - nearest) < 1e-15 * max(1, abs(nearest)):
+        return _QUADRANTS[nearest % 4]
+    return math.cos(angle), math.sin(angle)
+
+
+def matrix_to_quaternion(rotation: ArrayLike) -> Array:
+    """Convert rotation matrices to unit quaternions.
+
+    Of the four equivalent formulas the one with the largest divisor is used, so the result is
+    accurate at every rotation, half-turns included (Shepperd, J. Guidance and Control 1, 1978).
+
+    Args:
+        rotation: (..., 3, 3) rotation matrices.
+
+    Returns:
+        (..., 4) quaternions x, y, z, w with norm 1 and w >= 0; where w is 0 the first non-zero
+        component is positive.
+    """
+    R = np.asarray(rotation, dtype=float)
+    r00, r11, r22 = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
+    yz, xz, xy = (R[..., 2, 1] + R[..., 1, 2], R[..., 0, 2] + R[..., 2, 0],
+                  R[..., 1, 0] + R[..., 0, 1])
+    wx, wy, wz = (R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0],
+                  R[..., 1, 0] - R[..., 0, 1])
+    # 4 q q^T: row k is the quaternion times four times its own component k.
+    outer = np.stack([
+        np.stack([1 + r00 - r11 - r22, xy, xz, wx], axis=-1),
+        np.stack([xy, 1 - r00 + r11 - r22, yz, wy], axis=-1),
+        np.stack([xz, yz, 1 - r00 - r11 + r22, wz], axis=-1),
+        np.stack([wx, wy, wz, 1 + r00 + r11 + r22], axis=-1),
+    ], axis=-2)
+    largest = np.argmax(np.diagonal(outer, axis1=-2, axis2=-1), axis=-1)
+    q = np.take_along_axis(outer, largest[..., None, None], axis=-2)[..., 0, :]
+    return canonical_quaternion(q / np.linalg.norm(q, axis=-1, keepdims=True))
+
+
+def canonical_quaternion(quaternion: ArrayLike) -> Array:
+    """Return the one of the two equivalent quaternions q and -q that has w >= 0.
+
+    Args:
+        quaternion: (..., 4) quaternions x, y, z, w.
+
+    Returns:
+        (..., 4) the same rotations with w >= 0, and no negative zeros; where w is 0 the first
+        non-zero component is positive.
+    """
+    q = np.asarray(quaternion, dtype=float)
+    x, y, z, w = np.moveaxis(q, -1, 0)
+    leading = np.where(w != 0, w, np.where(x != 0, x, np.where(y != 0, y, z)))
+    return np.asarray(np.where(leading[..., None] < 0, -q, q) + 0.0)
+
+
+def quaternion_to_matrix(quaternion: ArrayLike) -> Array:
+    """Convert unit quaternions to rotation matrices.
+
+    Args:
+        quaternion: (..., 4) unit quaternions x, y, z, w.
+
+    Returns:
+        (..., 3, 3) rotation matrices.
+    """
+    x, y, z, w = np.moveaxis(np.asarray(quaternion, dtype=float), -1, 0)
+    R = np.empty((*x.shape, 3, 3))
+    R[..., 0, 0] = 1 - 2 * (y * y + z * z)
+    R[..., 1, 1] = 1 - 2 * (x * x + z * z)
+    R[..., 2, 2] = 1 - 2 * (x * x + y * y)
+    R[..., 0, 1], R[..., 1, 0] = 2 * (x * y - w * z), 2 * (x * y + w * z)
+    R[..., 0, 2], R[..., 2, 0] = 2 * (x * z + w * y), 2 * (x * z - w * y)
+    R[..., 1, 2], R[..., 2, 1] = 2 * (y * z - w * x), 2 * (y * z + w * x)
+    return R
+
+
+def is_rigid_transform(T: Array, tolerance: float = 1e-6) -> bool:
+    """Tell whether a (4, 4) matrix is a proper rotation and a translation, and nothing else."""
+    R = T[:3, :3]
+    return bool(
+        np.all(np.isfinite(T))
+        and np.array_equal(T[3], (0, 0, 0, 1))
+        and np.allclose(R @ R.T, np.eye(3), atol=tolerance)
+        and np.linalg.det(R) > 0
+    )
