@@ -1,0 +1,135 @@
+"""The `leg_fk` command: one subcommand per module of this package.
+
+A subcommand's module has `HELP` (one line), `EXAMPLES`, `add_arguments(parser)` and `run(args)`,
+and imports what is heavy (numpy too) only inside functions: `leg_fk -h` reads all of them, a
+command only its own.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from contextlib import suppress
+from importlib import import_module
+from importlib.util import find_spec
+import os
+import re
+import sys
+from typing import Any, NoReturn
+
+from icub_leg_fk import __version__
+from icub_leg_fk.errors import LegFKError
+
+MODULES = {
+    'list': 'list_chains',
+    'pose': 'pose',
+    'explain': 'explain',
+    'bag': 'bag',
+    'plot': 'plot',
+    'urdf': 'urdf',
+    'demo': 'demo',
+}
+
+DESCRIPTION = """\
+Joint angles in, foot poses out: forward kinematics of the iCub's legs, and of any
+Denavit-Hartenberg table. Lengths are metres, quaternions x y z w, poses in the root frame."""
+
+EXAMPLES = """\
+examples:
+  leg_fk list
+  leg_fk pose left_leg --version v2_5 --degrees 0 10 0 -30 -15 5
+  leg_fk explain left_leg --version v2_5
+  leg_fk bag walking.mcap walking_with_poses.mcap --version v2_5
+  leg_fk plot walking.mcap -o feet.png
+  leg_fk urdf left_leg right_leg --version v2_5 -o legs.urdf
+  leg_fk demo
+
+`leg_fk COMMAND -h` explains a command and shows more examples."""
+
+INTERRUPTED = 128 + 2  # as a shell reports SIGINT
+PIPE_CLOSED = 128 + 13  # and SIGPIPE
+
+_NEGATIVE_NUMBER = re.compile(r'-\.?\d.*|-(inf|nan).*', re.IGNORECASE)
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser that takes every negative number and complains in one line."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter,
+                         allow_abbrev=False, **settings)
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse the arguments; `-1e-3` is a value, which argparse alone takes for an option."""
+        # A word that starts with a space is never an option, and float() ignores the space.
+        args = [f' {arg}' if _NEGATIVE_NUMBER.fullmatch(arg) else arg for arg in args or ()]
+        return super().parse_known_args(args, namespace)
+
+    def error(self, message: str) -> NoReturn:
+        """Raise the mistake, for `main` to report."""
+        raise LegFKError(f'{message} (see {self.prog} -h)')
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command.
+
+    Args:
+        argv: the words after `leg_fk`; those of the process if None.
+
+    Returns:
+        The exit status: 0, or 2 after a mistake, which is told in one line on stderr.
+    """
+    words = sys.argv[1:] if argv is None else list(argv)
+    try:
+        status = _run(words)
+        if sys.stdout:
+            sys.stdout.flush()
+        return status
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except BrokenPipeError:
+        _forget_output()
+        return PIPE_CLOSED
+    except (LegFKError, OSError) as error:
+        print(f'leg_fk: error: {" ".join(str(error).split())}', file=sys.stderr)
+        if isinstance(error, OSError):
+            _forget_output()
+        return 2
+
+
+def _run(words: list[str]) -> int:
+    parser = _parser(words)
+    try:
+        args = parser.parse_args(words)
+    except SystemExit as done:  # -h and --version
+        return int(done.code or 0)
+    return int(args.run(args))
+
+
+def _parser(words: Sequence[str]) -> Parser:
+    """Return the parser: of the one subcommand that is asked for, else of all."""
+    parser = Parser(prog='leg_fk', description=DESCRIPTION, epilog=EXAMPLES)
+    parser.add_argument('--version', action='version', version=f'leg_fk {__version__}')
+    subparsers = parser.add_subparsers(title='commands', metavar='COMMAND', required=True)
+    chosen = next((word for word in words if not word.startswith('-')), '')
+    for name in (chosen,) if chosen in MODULES else MODULES:
+        path = f'icub_leg_fk.tools.{MODULES[name]}'
+        if find_spec(path) is None:
+            continue
+        module = import_module(path)
+        subparser = subparsers.add_parser(
+            name, help=module.HELP, description=module.HELP, epilog=module.EXAMPLES)
+        module.add_arguments(subparser)
+        subparser.set_defaults(run=module.run)
+    return parser
+
+
+def _forget_output() -> None:
+    """Let what is still buffered go nowhere, so that the interpreter does not complain at exit."""
+    if sys.stdout:
+        with suppress(OSError):  # not every stdout is a file
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+if __name__ == '__main__':
+    sys.exit(main())
