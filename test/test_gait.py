@@ -1,0 +1,137 @@
+"""The gait the project makes: both feet walk, every joint stays in its documented range."""
+
+import time
+
+import numpy as np
+import pytest
+
+from icub_leg_fk.errors import UnknownNameError
+from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.tools.gait import PERIOD, walk
+
+RATE = 160.0  # Hz; a period is 200 samples, half a period 100
+# The legs' ranges as printed [deg], hip_roll narrowed by the erratum -17 .. 119.
+PRINTED = np.radians([(-44, 132), (-17, 17), (-79, 79), (-125, 0), (-42, 21), (-24, 24)])
+
+
+@pytest.fixture(scope='module')
+def catalog():
+    return Catalog.load()
+
+
+@pytest.fixture(scope='module')
+def gait(catalog):
+    return walk(catalog, 'v2_5', seconds=2 * PERIOD, rate=RATE)
+
+
+@pytest.fixture(scope='module')
+def soles(catalog, gait):
+    """Left and right sole, (N, 4, 4), by the plain product of the DH matrices."""
+    left, right = (catalog.chain(name, 'v2_5', 'sole') for name in ('left_leg', 'right_leg'))
+    return (np.array([left.forward(q) for q in gait.positions[:, :6]]),
+            np.array([right.forward(q) for q in gait.positions[:, 6:]]))
+
+
+@pytest.mark.parametrize('version', ['v1', 'v2_5'])
+def test_every_joint_stays_in_its_documented_range(catalog, version):
+    legs = walk(catalog, version).positions.reshape(-1, 6)
+    assert (legs >= PRINTED[:, 0]).all()
+    assert (legs <= PRINTED[:, 1]).all()
+
+
+def test_every_joint_moves_in_every_version(catalog):
+    for version in catalog.entry('left_leg').versions:
+        assert (np.ptp(walk(catalog, version).positions, axis=0) > np.radians(2)).all(), version
+
+
+def test_names_all_twelve_leg_joints(gait):
+    joints = ('hip_pitch', 'hip_roll', 'hip_yaw', 'knee', 'ankle_pitch', 'ankle_roll')
+    assert gait.joint_names == tuple(f'{side}_{joint}' for side in 'lr' for joint in joints)
+
+
+def test_soles_stay_level_and_face_forward(soles):
+    for sole in soles:
+        assert np.abs(sole[:, :3, :3] - np.diag([-1, -1, 1])).max() < 1e-6
+
+
+def test_each_foot_lifts_four_to_five_centimetres_above_the_standing_one(soles):
+    left, right = (sole[:, 2, 3] for sole in soles)
+    assert 0.04 < (left - right).max() < 0.05
+    assert 0.04 < (right - left).max() < 0.05
+
+
+def test_one_foot_stands_at_any_time_and_both_for_a_while(soles):
+    """A foot on the ground is as low as the lower one, and moves back as fast as its peer."""
+    left, right = (sole[:, :3, 3] for sole in soles)
+    both = np.abs(left[:, 2] - right[:, 2]) < 1e-9
+    assert 0.1 < both.mean() < 0.4
+    steps = np.diff(left - right, axis=0)[both[1:] & both[:-1]]
+    assert np.abs(steps).max() < 1e-9
+
+
+def test_steps_are_ten_to_twenty_centimetres_long_both_ways(soles):
+    ahead = soles[1][:, 0, 3] - soles[0][:, 0, 3]  # of the left foot; x is backward
+    assert 0.1 < ahead.max() < 0.2
+    assert 0.1 < -ahead.min() < 0.2
+
+
+def test_standing_foot_moves_backward_and_swinging_foot_forward(soles):
+    for foot, other in (soles, soles[::-1]):
+        dx = np.gradient(foot[:, 0, 3])
+        swinging = foot[:, 2, 3] - other[:, 2, 3] > 0.02
+        assert (dx[swinging] < 0).all()
+        assert (dx[foot[:, 2, 3] < other[:, 2, 3] - 0.02] > 0).all()
+
+
+def test_pelvis_sways_over_the_standing_foot_and_feet_never_collide(soles):
+    left, right = (sole[:, :3, 3] for sole in soles)
+    middle = (left[:, 1] + right[:, 1]) / 2  # y is to the right
+    left_swings, right_swings = left[:, 2] > right[:, 2] + 0.03, right[:, 2] > left[:, 2] + 0.03
+    assert (middle[left_swings] < -0.01).all()  # the pelvis is right of the middle
+    assert (middle[right_swings] > 0.01).all()
+    assert (right[:, 1] - left[:, 1]).min() > 0.1
+
+
+def test_right_leg_does_what_the_left_did_half_a_period_before(gait):
+    half = round(PERIOD * RATE / 2)
+    left, right = gait.positions[:-half, :6], gait.positions[half:, 6:]
+    assert np.abs(left - right).max() < 1e-9
+
+
+def test_repeats_every_period(gait):
+    samples = round(PERIOD * RATE)
+    assert np.array_equal(gait.positions[samples:], gait.positions[:samples])
+    assert np.array_equal(gait.velocities[samples:], gait.velocities[:samples])
+
+
+def test_velocities_are_the_rate_of_change_of_the_positions(catalog):
+    error = {}
+    for rate in (400.0, 800.0):
+        gait = walk(catalog, 'v2_5', seconds=PERIOD, rate=rate)
+        central = (np.roll(gait.positions, -1, 0) - np.roll(gait.positions, 1, 0)) * rate / 2
+        error[rate] = np.abs(central - gait.velocities).max()
+    assert error[400.0] < 3e-3
+    assert error[800.0] < error[400.0] / 3.5  # central differences are of second order
+
+
+def test_velocities_are_continuous(gait):
+    assert np.abs(np.diff(gait.velocities, axis=0)).max() * RATE < 60  # rad/s^2
+    assert np.abs(gait.velocities).max() < 5  # rad/s
+
+
+@pytest.mark.parametrize(('seconds', 'rate'), [(10.0, 100.0), (0.5, 30.0), (3.0, 7.0)])
+def test_times_follow_the_rate(catalog, seconds, rate):
+    gait = walk(catalog, 'v2_5', seconds, rate)
+    assert np.allclose(gait.times, np.arange(round(seconds * rate)) / rate)
+    assert gait.positions.shape == gait.velocities.shape == (len(gait.times), 12)
+
+
+def test_ten_seconds_at_100_hz_take_under_a_second_to_make(catalog):
+    start = time.process_time()
+    walk(catalog, 'v2_5')
+    assert time.process_time() - start < 1.0
+
+
+def test_unknown_version_lists_the_known_ones(catalog):
+    with pytest.raises(UnknownNameError, match='v2_5'):
+        walk(catalog, 'v9')
