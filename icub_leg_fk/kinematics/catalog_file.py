@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import math
 from pathlib import Path
 
-import numpy as np
-
-from icub_leg_fk.kinematics.link import JOINT_TYPES, DHLink
+from icub_leg_fk.kinematics.link import DHLink, JOINT_TYPES
 from icub_leg_fk.kinematics.rotation import Array, is_rigid_transform
 from icub_leg_fk.kinematics.yaml_fields import Field, read_yaml
+import numpy as np
 
 _LENGTHS = {'mm': 1e-3, 'm': 1.0}
 _ANGLES = {'deg': math.pi / 180, 'rad': 1.0}

@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-import numpy as np
-from numpy.typing import ArrayLike
-
 from icub_leg_fk.errors import JointVectorError, LegFKError
 from icub_leg_fk.kinematics.link import DHLink
 from icub_leg_fk.kinematics.rotation import Array, is_rigid_transform, quaternion_to_matrix
 from icub_leg_fk.kinematics.solver import Pose, PoseSolver
+import numpy as np
+from numpy.typing import ArrayLike
 
 
 @dataclass(frozen=True, eq=False)

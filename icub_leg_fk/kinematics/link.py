@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
-import numpy as np
-
 from icub_leg_fk.errors import LegFKError
 from icub_leg_fk.kinematics.rotation import Array, cos_sin
+import numpy as np
 
 JOINT_TYPES = ('revolute', 'prismatic')
 

@@ -20,12 +20,15 @@ from collections.abc import Sequence
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from icub_leg_fk.errors import JointVectorError
 from icub_leg_fk.kinematics.link import DHLink
-from icub_leg_fk.kinematics.rotation import Array, canonical_quaternion, cos_sin
-from icub_leg_fk.kinematics.rotation import matrix_to_quaternion
+from icub_leg_fk.kinematics.rotation import (
+    Array,
+    canonical_quaternion,
+    cos_sin,
+    matrix_to_quaternion,
+)
+import numpy as np
 
 BLOCK = 4096  # rows worked on at once: a dozen such arrays stay in the L2 cache
 

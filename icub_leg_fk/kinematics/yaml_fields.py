@@ -13,9 +13,8 @@ from pathlib import Path
 import re
 from typing import Any, NoReturn
 
-import yaml
-
 from icub_leg_fk.errors import CatalogError
+import yaml
 
 MAX_BYTES = 1_000_000
 MAX_DEPTH = 16
