@@ -1,0 +1,1 @@
+"""The node: JointState in, foot poses out. `joint_*` and `pose_*` modules need no rclpy."""

@@ -1,0 +1,120 @@
+"""sensor_msgs/JointState from its CDR bytes, bounds-checked.
+
+The bytes come from the network: every length is checked against what is there before anything is
+read or allocated. Layout (OMG CDR, rosidl): encapsulation (4 bytes), stamp sec and nanosec,
+frame_id, name[], position[], velocity[], effort[]; alignment counts from the fifth byte.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import NamedTuple
+
+from icub_leg_fk.errors import MalformedMessageError
+
+_BYTE_ORDER = {b'\x00\x01': '<', b'\x00\x00': '>'}
+STAMP_END = 12  # encapsulation and stamp; frame_id follows
+
+
+class JointStateMessage(NamedTuple):
+    """The fields of a JointState that matter here, and where its numbers lie in the bytes.
+
+    Attributes:
+        sec: seconds of the stamp.
+        nanosec: nanoseconds of the stamp.
+        names: joint names.
+        positions: positions [rad or m].
+        velocities: velocities [rad/s or m/s].
+        byte_order: `<` or `>`.
+        positions_at: offset of the first position.
+        velocities_at: offset of the count of velocities.
+        efforts_at: offset of the count of efforts.
+        efforts: number of efforts.
+    """
+
+    sec: int
+    nanosec: int
+    names: tuple[str, ...]
+    positions: tuple[float, ...]
+    velocities: tuple[float, ...]
+    byte_order: str
+    positions_at: int
+    velocities_at: int
+    efforts_at: int
+    efforts: int
+
+
+def decode_joint_state(data: bytes) -> JointStateMessage:
+    """Decode a serialized JointState.
+
+    Raises:
+        MalformedMessageError: the bytes end too early, a length is absurd, or the encoding is
+            not plain CDR; names the field.
+    """
+    byte_order = _BYTE_ORDER.get(bytes(data[:2]))
+    if byte_order is None:
+        raise MalformedMessageError(
+            f'JointState: encapsulation found 0x{bytes(data[:2]).hex()}, allowed: 0x0000, 0x0001')
+    reader = _Reader(data, byte_order)
+    sec, nanosec = reader.unpack('header.stamp', 'iI')
+    reader.string('header.frame_id')
+    # A string takes at least its length field, so the count cannot exceed a quarter of the rest.
+    names = tuple([reader.string('name') for _ in range(reader.count('name', 4))])
+    positions_at, positions = reader.doubles('position')
+    velocities_at = reader.align(4)
+    _, velocities = reader.doubles('velocity')
+    efforts_at = reader.align(4)
+    _, efforts = reader.doubles('effort')
+    return JointStateMessage(sec, nanosec, names, positions, velocities, byte_order,
+                             positions_at, velocities_at, efforts_at, len(efforts))
+
+
+class _Reader:
+    """A position in CDR bytes that refuses to move past their end."""
+
+    def __init__(self, data: bytes, byte_order: str) -> None:
+        self._data = data
+        self._order = byte_order
+        self._at = 4
+
+    def align(self, size: int) -> int:
+        """Return the next offset that is a multiple of size, and go there."""
+        self._at += -(self._at - 4) % size
+        return self._at
+
+    def _take(self, field: str, size: int) -> int:
+        start, end = self._at, self._at + size
+        if end > len(self._data):
+            raise MalformedMessageError(
+                f'JointState: {field} found to end at byte {end}, allowed: {len(self._data)}')
+        self._at = end
+        return start
+
+    def unpack(self, field: str, fmt: str) -> tuple[int, ...]:
+        fmt = self._order + fmt
+        return struct.unpack_from(fmt, self._data, self._take(field, struct.calcsize(fmt)))
+
+    def count(self, field: str, item_size: int) -> int:
+        self.align(4)
+        count = self.unpack(field, 'I')[0]
+        if count * item_size > len(self._data) - self._at:
+            raise MalformedMessageError(
+                f'JointState: {field} found {count} items, '
+                f'allowed: what fits in {len(self._data) - self._at} bytes')
+        return count
+
+    def string(self, field: str) -> str:
+        size = self.count(field, 1)
+        start = self._take(field, size)
+        text = self._data[start:start + size]
+        if size and text.find(b'\x00') != size - 1:
+            raise MalformedMessageError(f'JointState: {field} is no string that ends with NUL')
+        return bytes(text[:-1]).decode('utf-8', 'replace')
+
+    def doubles(self, field: str) -> tuple[int, tuple[float, ...]]:
+        """Return the offset of the first number, and the numbers."""
+        count = self.count(field, 8)
+        if count:
+            self.align(8)
+        start = self._take(field, 8 * count)
+        return start, struct.unpack_from(f'{self._order}{count}d', self._data, start)
