@@ -3,6 +3,7 @@
 - Joints are matched by name; joints of no chain are ignored.
 - A message that brings some of a chain's joints updates those. The chain is then ready if each of
   its joints is known, finite and no older than `joint_timeout` beside the newest of them.
+  (Finite is what leaves room to compute with: less than `LARGEST_POSITION`.)
 - A message is rejected as a whole if `position` is shorter than `name` or a name stands twice; an
   empty `position` is counted only.
 - Time has stepped back if a message is older than what is held of a joint it brings, or older by
@@ -24,6 +25,7 @@ from icub_leg_fk.kinematics import Chain
 
 MESSAGE_REASONS = ('malformed', 'empty_position', 'short_position', 'duplicate_name', 'time_jump')
 CHAIN_REASONS = ('missing_joint', 'non_finite', 'stale_joint')
+LARGEST_POSITION = 1e150  # beyond it sums and products of positions overflow
 _REMEMBERED_NAME_LISTS = 64
 
 
@@ -216,7 +218,7 @@ class JointInput:
             elif stamp < oldest_allowed:
                 age = (max(known) - stamp) / 1e9
                 found.setdefault('stale_joint', {})[name] = f'{age:.3f} s old'
-            elif not math.isfinite(position):
+            elif not abs(position) < LARGEST_POSITION:
                 found.setdefault('non_finite', {})[name] = str(position)
         if found:
             for reason, joints in found.items():

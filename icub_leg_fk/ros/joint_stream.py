@@ -14,15 +14,15 @@ from collections.abc import Callable, Sequence
 import math
 from operator import itemgetter
 import struct
-import sys
 from typing import Any
 
 from icub_leg_fk.errors import MalformedMessageError
 from icub_leg_fk.kinematics import Chain
-from icub_leg_fk.ros.joint_input import JointInput
+from icub_leg_fk.ros.joint_input import LARGEST_POSITION, JointInput
 from icub_leg_fk.ros.joint_state_cdr import STAMP_END, JointStateMessage, decode_joint_state
 
 _REMEMBERED_LAYOUTS = 8
+_LARGEST = math.nextafter(LARGEST_POSITION, 0.0)
 _FIRST = 3  # fields before the joints: encapsulation, sec, nanosec
 
 Fields = tuple[Any, ...]
@@ -70,11 +70,11 @@ def _picker(places: list[int]) -> Callable[[Fields], Fields]:
 
 
 def _bounds(name: str, chains: Sequence[Chain]) -> tuple[float, float]:
-    """Return the range of a joint that every chain agrees with, and that no infinity is in."""
+    """Return the range of a joint that every chain agrees with, without infinities."""
     links = [link for chain in chains
              for joint, link in zip(chain.joint_names, chain.links, strict=True) if joint == name]
-    return (max(-sys.float_info.max, *(link.lower for link in links)),
-            min(sys.float_info.max, *(link.upper for link in links)))
+    return (max(-_LARGEST, *(link.lower for link in links)),
+            min(_LARGEST, *(link.upper for link in links)))
 
 
 class JointStream:
@@ -120,7 +120,7 @@ class JointStream:
             return
         for position, (lower, upper) in zip(fields[_FIRST:], layout.bounds):
             if not lower <= position <= upper:
-                if not all(map(math.isfinite, fields[_FIRST:-2])):
+                if not all([abs(value) <= _LARGEST for value in fields[_FIRST:-2]]):
                     self._feed_plain(data)
                     return
                 for index, pick in layout.chains:
