@@ -1,0 +1,106 @@
+"""The options that subcommands share: a chain, its version, joint positions, a kinematics file."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+import math
+from typing import TYPE_CHECKING
+
+from icub_leg_fk.errors import JointVectorError, LegFKError
+
+if TYPE_CHECKING:
+    from icub_leg_fk.kinematics import Catalog, Chain
+
+DEFAULT_VERSION = 'v2_5'
+
+
+def add_kinematics_file(parser: argparse.ArgumentParser) -> None:
+    """Add `-k`, `--kinematics-file`."""
+    parser.add_argument(
+        '-k', '--kinematics-file', metavar='FILE',
+        help='a kinematics file of your own, with the DH tables of any robot (default: the '
+             "iCub's, as shipped)")
+
+
+def add_json(parser: argparse.ArgumentParser) -> None:
+    """Add `--json`."""
+    parser.add_argument('--json', action='store_true', help='print JSON, for programs')
+
+
+def add_chain(parser: argparse.ArgumentParser) -> None:
+    """Add the chain, `--version`, `--foot-frame` and the kinematics file."""
+    parser.add_argument('chain', metavar='CHAIN',
+                        help='a chain of the kinematics file, such as left_leg (see leg_fk list)')
+    parser.add_argument('--version', metavar='VERSION',
+                        help='version of the chain (default: v2_5, if the chain has it)')
+    parser.add_argument('--foot-frame', metavar='{dh,sole}', default='dh',
+                        help="axes of the tip: the table's last frame (the default), or the sole "
+                             '(x forward, y left, z up)')
+    add_kinematics_file(parser)
+
+
+def add_joint_positions(parser: argparse.ArgumentParser, *, required: bool) -> None:
+    """Add `--degrees` and `--radians`, of which at most one may be given."""
+    group = parser.add_mutually_exclusive_group(required=required)
+    for unit in ('degrees', 'radians'):
+        group.add_argument(
+            f'--{unit}', metavar='Q', nargs='+', type=_finite_number,
+            help=f'joint positions in {unit}, root to tip; of a prismatic joint always in metres')
+
+
+def _finite_number(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(
+            f'found {text.strip()!r}, allowed: finite numbers, one per joint')
+    return value
+
+
+def chosen_version(catalog: Catalog, chain: str, version: str | None) -> str:
+    """Return the version asked for, or else the default one if the chain has that.
+
+    Raises:
+        UnknownNameError: no such chain; lists the known ones.
+        LegFKError: no version was given and the chain lacks the default one.
+    """
+    versions = catalog.entry(chain).versions
+    if version is None and DEFAULT_VERSION not in versions:
+        raise LegFKError(f'chain {chain} has no version {DEFAULT_VERSION}, the default: give '
+                         f'--version; known: {", ".join(versions)}')
+    return version or DEFAULT_VERSION
+
+
+def load_chain(args: argparse.Namespace) -> tuple[Catalog, Chain]:
+    """Return the catalog and the chain that the options of `add_chain` name.
+
+    Raises:
+        LegFKError: the file is bad, or a name is not in it.
+    """
+    from icub_leg_fk.kinematics import Catalog
+
+    catalog = Catalog.load(args.kinematics_file)
+    version = chosen_version(catalog, args.chain, args.version)
+    return catalog, catalog.chain(args.chain, version, args.foot_frame)
+
+
+def joint_positions(args: argparse.Namespace, chain: Chain) -> list[float] | None:
+    """Return the joint vector given by `--degrees` or `--radians` [rad or m]; None if none is.
+
+    Raises:
+        JointVectorError: not one value per joint.
+    """
+    given: Sequence[float] | None = args.radians if args.degrees is None else args.degrees
+    if given is None:
+        return None
+    if len(given) != len(chain.links):
+        raise JointVectorError(
+            f'joint positions: found {len(given)}, allowed: {len(chain.links)}, in the order '
+            f'{" ".join(chain.joint_names)}')
+    if args.degrees is None:
+        return list(given)
+    return [value if link.is_prismatic else math.radians(value)
+            for value, link in zip(given, chain.links, strict=True)]

@@ -1,0 +1,117 @@
+"""Numbers, tables and matrices as text that can be checked by eye."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+import json
+import math
+import textwrap
+from typing import Any
+
+from icub_leg_fk.kinematics.link import DHLink
+
+WIDTH = 98
+
+Rows = Sequence[Sequence[str]]
+
+
+def fixed(value: float, decimals: int) -> str:
+    """Return a number with exactly so many decimals, and without a negative zero."""
+    return f'{round(value, decimals) + 0.0:.{decimals}f}'
+
+
+def short(value: float, decimals: int = 4) -> str:
+    """Return a number with at most so many decimals: 0.5, -1, 17.3205."""
+    text = fixed(value, decimals)
+    return text.rstrip('0').rstrip('.') if '.' in text else text
+
+
+def position_text(link: DHLink, position: float) -> str:
+    """Return a joint position [rad or m] as `12.5 deg` or, if prismatic, `0.2 m`."""
+    return f'{short(*position_in(link, position))} {"m" if link.is_prismatic else "deg"}'
+
+
+def range_text(link: DHLink) -> str:
+    """Return the documented range as `-44 .. 132 deg`; nothing if there is none."""
+    if link.lower == -math.inf and link.upper == math.inf:
+        return ''
+    lower, _ = position_in(link, link.lower)
+    return f'{short(lower)} .. {position_text(link, link.upper)}'
+
+
+def position_in(link: DHLink, position: float) -> tuple[float, int]:
+    """Return a joint position in degrees, or metres if prismatic, and its useful decimals."""
+    return (position, 6) if link.is_prismatic else (math.degrees(position), 4)
+
+
+def columns(rows: Rows, gap: str = '  ') -> list[str]:
+    """Return the rows as lines, each column as wide as its widest cell.
+
+    Numbers stand with their decimal points under each other, other columns on the left.
+    """
+    aligned = map(_aligned, zip(*rows, strict=True))
+    return [gap.join(cells).rstrip() for cells in zip(*aligned, strict=True)]
+
+
+def matrix(rows: Rows, gap: str = ' ') -> list[str]:
+    """Return the lines of a matrix in brackets."""
+    aligned = [_aligned(column, right=True) for column in zip(*rows, strict=True)]
+    return [f'[{gap.join(cells)}]' for cells in zip(*aligned, strict=True)]
+
+
+def beside(*blocks: str | Sequence[str], gap: str = ' ') -> list[str]:
+    """Return blocks of lines side by side, words in the middle of the tallest block."""
+    height = max(1 if isinstance(block, str) else len(block) for block in blocks)
+    padded = []
+    for block in blocks:
+        lines = [block] if isinstance(block, str) else list(block)
+        above = (height - len(lines)) // 2
+        lines = [''] * above + lines + [''] * (height - len(lines) - above)
+        width = max(map(len, lines))
+        padded.append([line.ljust(width) for line in lines])
+    return [gap.join(parts).rstrip() for parts in zip(*padded, strict=True)]
+
+
+def indented(lines: Iterable[str], by: int = 2) -> list[str]:
+    """Return the lines moved to the right."""
+    return [' ' * by + line if line else '' for line in lines]
+
+
+def wrapped(text: str, after: str = '  ') -> list[str]:
+    """Return the lines of a sentence, all but the first moved to the right."""
+    return textwrap.wrap(text, WIDTH, subsequent_indent=after, break_long_words=False,
+                         break_on_hyphens=False)
+
+
+def json_text(value: Any) -> str:
+    """Return JSON with its innermost lists of numbers or words on one line each."""
+    return _json(value, 0)
+
+
+def _json(value: Any, depth: int) -> str:
+    flat = not isinstance(value, (dict, list)) or not any(
+        isinstance(item, (dict, list))
+        for item in (value.values() if isinstance(value, dict) else value))
+    if flat and not isinstance(value, dict) or not value:
+        return json.dumps(value, allow_nan=False)
+    inside, outside = '  ' * (depth + 1), '  ' * depth
+    if isinstance(value, dict):
+        items = [f'{json.dumps(key)}: {_json(item, depth + 1)}' for key, item in value.items()]
+        return '{\n' + ',\n'.join(inside + item for item in items) + f'\n{outside}}}'
+    items = [_json(item, depth + 1) for item in value]
+    return '[\n' + ',\n'.join(inside + item for item in items) + f'\n{outside}]'
+
+
+def _aligned(column: Sequence[str], right: bool = False) -> list[str]:
+    """Pad the cells of a column to one width."""
+    if all(map(_is_number, filter(None, column))):
+        decimals = [len(cell) - len(cell.partition('.')[0]) for cell in column]
+        column = [cell + ' ' * (max(decimals) - own)
+                  for cell, own in zip(column, decimals, strict=True)]
+        right = True
+    width = max(map(len, column))
+    return [cell.rjust(width) if right else cell.ljust(width) for cell in column]
+
+
+def _is_number(text: str) -> bool:
+    return text.strip('-').replace('.', '', 1).isdigit()
