@@ -1,0 +1,35 @@
+"""Settings of every test run: ROS 2 stays on this machine, in a domain of the run's own."""
+
+import os
+import socket
+
+from hypothesis import settings
+
+# The ports by which domain_coordinator, ROS 2's own tool for this, marks a domain as taken.
+PORT_BASE = 32768
+DOMAINS = 100
+
+
+def claim_domain() -> tuple[int, socket.socket]:
+    """Return a ROS domain that no other test run uses while the socket lives."""
+    for i in range(DOMAINS):
+        domain = (os.getpid() + i) % DOMAINS + 1
+        claim = socket.socket()
+        try:
+            claim.bind(('', PORT_BASE + domain))
+        except OSError:
+            claim.close()
+        else:
+            return domain, claim
+    raise RuntimeError(f'ROS domains 1 to {DOMAINS} are all taken by test runs')
+
+
+# Set here, before any test imports rclpy, so that it and every child process see them.
+domain_id, _claim = claim_domain()
+os.environ['ROS_DOMAIN_ID'] = str(domain_id)
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
+
+# How long an example takes says nothing on a busy machine.
+settings.register_profile('icub_leg_fk', deadline=None)
+settings.load_profile('icub_leg_fk')

@@ -1,0 +1,22 @@
+"""The linters whose settings are in pyproject.toml find nothing."""
+
+import importlib.util
+from pathlib import Path
+import subprocess
+import sys
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.mark.parametrize('command', [
+    pytest.param(['ruff', 'check', '--no-fix', '.'], id='ruff'),
+    pytest.param(['mypy'], id='mypy --strict'),
+])
+def test_linter_finds_nothing(command: list[str]) -> None:
+    if importlib.util.find_spec(command[0]) is None:
+        pytest.skip(f'{command[0]} is not installed')
+    result = subprocess.run(
+        [sys.executable, '-m', *command], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stdout + result.stderr
