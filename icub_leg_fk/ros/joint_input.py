@@ -24,9 +24,11 @@ from typing import NamedTuple
 from icub_leg_fk.kinematics import Chain
 
 MESSAGE_REASONS = ('malformed', 'empty_position', 'short_position', 'duplicate_name', 'time_jump')
-CHAIN_REASONS = ('missing_joint', 'non_finite', 'stale_joint')
+CHAIN_REASONS = ('missing_joint', 'non_finite', 'stale_joint', 'no_velocity')
 LARGEST_POSITION = 1e150  # beyond it sums and products of positions overflow
 _REMEMBERED_NAME_LISTS = 64
+_REMEMBERED_NAMES = 1000  # in one list, and
+_REMEMBERED_CHARACTERS = 65536  # in it; what a stranger sends may be longer
 
 
 class JointVector(NamedTuple):
@@ -121,7 +123,7 @@ class JointInput:
             return []
         resolved = self._names.get(names) or self._resolve(names)
         if resolved.duplicate is not None:
-            self._reject('duplicate_name', f'name {resolved.duplicate!r} stands twice; '
+            self._reject('duplicate_name', f'name {resolved.duplicate[:60]!r} stands twice; '
                          'message ignored')
             return []
         if not resolved.pairs:
@@ -166,6 +168,28 @@ class JointInput:
         self.messages += 1
         self._reject('malformed', f'{error}; message ignored')
 
+    def note_no_velocity(self, chain: int) -> None:
+        """Count a joint vector whose velocities are wanted and unknown."""
+        self.chain_counts[chain].held_back['no_velocity'] += 1
+        self.chain_counts[chain].blame('no_velocity', {'twist': 'not sent'})
+        self._report('no_velocity', f'{self.chains[chain].name}: no twist: velocity is absent, '
+                     'short or not finite')
+
+    def take_counts(self, chain: int) -> ChainCounts:
+        """Return what has happened to a chain since this was last called."""
+        counts, self.chain_counts[chain] = self.chain_counts[chain], ChainCounts()
+        return counts
+
+    def take_over(self, previous: JointInput) -> None:
+        """Go on with the joints and message counts of an input that this one replaces."""
+        self.messages, self.counts, self.newest = \
+            previous.messages, previous.counts, previous.newest
+        for name, slot in self._slots.items():
+            if (old := previous._slots.get(name)) is not None:
+                self._stamps[slot] = previous._stamps[old]
+                self._positions[slot] = previous._positions[old]
+                self._velocities[slot] = previous._velocities[old]
+
     def known_joints(self, chain: int) -> dict[str, int]:
         """Return the stamps [ns] of those joints of a chain that are held."""
         return {name: stamp for name, slot in zip(
@@ -191,9 +215,12 @@ class JointInput:
         brought = {slot for _, slot in pairs}
         chains = tuple(index for index, slots in enumerate(self._chain_slots)
                        if brought.intersection(slots))
-        if len(self._names) >= _REMEMBERED_NAME_LISTS:
-            self._names.clear()
-        resolved = self._names[names] = _Names(duplicate, pairs, chains)
+        resolved = _Names(duplicate, pairs, chains)
+        if (len(names) <= _REMEMBERED_NAMES
+                and sum(map(len, names)) <= _REMEMBERED_CHARACTERS):
+            if len(self._names) >= _REMEMBERED_NAME_LISTS:
+                self._names.clear()
+            self._names[names] = resolved
         return resolved
 
     def _stepped_back(self, stamp_ns: int, resolved: _Names) -> bool:

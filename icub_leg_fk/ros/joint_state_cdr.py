@@ -2,7 +2,11 @@
 
 The bytes come from the network: every length is checked against what is there before anything is
 read or allocated. Layout (OMG CDR, rosidl): encapsulation (4 bytes), stamp sec and nanosec,
-frame_id, name[], position[], velocity[], effort[]; alignment counts from the fifth byte.
+frame_id, name[], position[], velocity[], effort[]; alignment counts from the fifth byte. Padding
+may hold anything: Fast CDR leaves in it what was in the buffer before.
+
+What Fast CDR takes and this refuses: a parameter-list encapsulation (0x0002, 0x0003), which
+no JointState has; a string without NUL at its end, or with one before it.
 """
 
 from __future__ import annotations
@@ -30,6 +34,7 @@ class JointStateMessage(NamedTuple):
         velocities_at: offset of the count of velocities.
         efforts_at: offset of the count of efforts.
         efforts: number of efforts.
+        padding: offset and size of what is skipped for alignment.
     """
 
     sec: int
@@ -42,6 +47,7 @@ class JointStateMessage(NamedTuple):
     velocities_at: int
     efforts_at: int
     efforts: int
+    padding: tuple[tuple[int, int], ...]
 
 
 def decode_joint_state(data: bytes) -> JointStateMessage:
@@ -66,20 +72,25 @@ def decode_joint_state(data: bytes) -> JointStateMessage:
     efforts_at = reader.align(4)
     _, efforts = reader.doubles('effort')
     return JointStateMessage(sec, nanosec, names, positions, velocities, byte_order,
-                             positions_at, velocities_at, efforts_at, len(efforts))
+                             positions_at, velocities_at, efforts_at, len(efforts),
+                             tuple(reader.padding))
 
 
 class _Reader:
     """A position in CDR bytes that refuses to move past their end."""
 
     def __init__(self, data: bytes, byte_order: str) -> None:
+        self.padding: list[tuple[int, int]] = []
         self._data = data
         self._order = byte_order
         self._at = 4
 
     def align(self, size: int) -> int:
         """Return the next offset that is a multiple of size, and go there."""
-        self._at += -(self._at - 4) % size
+        padding = -(self._at - 4) % size
+        if padding:
+            self.padding.append((self._at, padding))
+            self._at += padding
         return self._at
 
     def _take(self, field: str, size: int) -> int:

@@ -2,7 +2,8 @@
 
 A robot sends the same names in the same order a thousand times a second. The first message of a
 kind is decoded in full and its layout remembered: the bytes from frame_id to the first position,
-and where its numbers lie. A message that repeats these bytes is unpacked in one go. Whenever
+and where its numbers lie. A message that repeats these bytes is unpacked in one go; the padding
+among them may differ, for publishers leave in it whatever their buffer held before. Whenever
 anything is out of the ordinary (another layout, time not moving on, a value that is no finite
 number, a chain brought in parts) the message goes the plain way through `decode_joint_state` and
 `JointInput.update`, which stay the only place where the rules are decided.
@@ -18,16 +19,17 @@ from typing import Any
 
 from icub_leg_fk.errors import MalformedMessageError
 from icub_leg_fk.kinematics import Chain
-from icub_leg_fk.ros.joint_input import LARGEST_POSITION, JointInput
-from icub_leg_fk.ros.joint_state_cdr import STAMP_END, JointStateMessage, decode_joint_state
+from icub_leg_fk.ros.joint_input import JointInput, LARGEST_POSITION
+from icub_leg_fk.ros.joint_state_cdr import decode_joint_state, JointStateMessage, STAMP_END
 
 _REMEMBERED_LAYOUTS = 8
+_LARGEST_REMEMBERED = 65536  # bytes of a message; what a stranger sends may be larger
 _LARGEST = math.nextafter(LARGEST_POSITION, 0.0)
 _FIRST = 3  # fields before the joints: encapsulation, sec, nanosec
 
 Fields = tuple[Any, ...]
 OnReady = Callable[[int, int, Sequence[float], Sequence[float] | None], None]
-"""Called with stamp sec, nanosec, positions and velocities (None if unknown)."""
+"""Called with stamp sec, nanosec, positions and velocities (None if unknown or not wanted)."""
 
 
 class _Layout:
@@ -44,10 +46,29 @@ class _Layout:
         self.bounds = tuple(_bounds(name, chains) for name in self.names)
         self.size = len(data)
         self.head = data[STAMP_END:message.positions_at]
+        self._mask = int.from_bytes(_head_mask(message), 'little')
+        self._masked_head = int.from_bytes(self.head, 'little') & self._mask
         self.fixed = (data[:4], len(message.velocities), message.efforts)
         self.unpack = _struct(data, message, [index for _, index in joints]).unpack
         self.repeats = 0
         self.last: tuple[int, int, Fields] | None = None
+
+    def adopt(self, data: bytes) -> bool:
+        """Return whether the head of data differs in padding only; if so, it is the head now."""
+        head = data[STAMP_END:STAMP_END + len(self.head)]
+        same = int.from_bytes(head, 'little') & self._mask == self._masked_head
+        if same:
+            self.head = head
+        return same
+
+
+def _head_mask(message: JointStateMessage) -> bytes:
+    """Return 255 for each byte from frame_id to the first position, but 0 where padding is."""
+    mask = bytearray(b'\xff' * message.positions_at)
+    for at, size in message.padding:
+        if at < message.positions_at:
+            mask[at:at + size] = bytes(size)
+    return bytes(mask[STAMP_END:])
 
 
 def _struct(data: bytes, message: JointStateMessage, indices: list[int]) -> struct.Struct:
@@ -118,9 +139,10 @@ class JointStream:
                 or (fields[0], fields[-2], fields[-1]) != layout.fixed):
             self._feed_plain(data)
             return
-        for position, (lower, upper) in zip(fields[_FIRST:], layout.bounds):
+        for position, (lower, upper) in zip(fields[_FIRST:], layout.bounds):  # noqa: B905
             if not lower <= position <= upper:
-                if not all([abs(value) <= _LARGEST for value in fields[_FIRST:-2]]):
+                usable = [abs(value) <= _LARGEST for value in fields[_FIRST:-2]]
+                if not all(usable):
                     self._feed_plain(data)
                     return
                 for index, pick in layout.chains:
@@ -147,10 +169,11 @@ class JointStream:
         return self._input
 
     def _known_layout(self, data: bytes) -> _Layout | None:
-        for layout in self._layouts:
-            if layout.size == len(data) and data.startswith(layout.head, STAMP_END):
+        layouts = [layout for layout in self._layouts if layout.size == len(data)]
+        for layout in layouts:
+            if data.startswith(layout.head, STAMP_END):
                 return layout
-        return None
+        return next((layout for layout in layouts if layout.adopt(data)), None)
 
     def _feed_plain(self, data: bytes) -> None:
         joint_input = self.settle()
@@ -170,10 +193,13 @@ class JointStream:
         for vector in vectors:
             handler = self.on_ready[vector.chain]
             if handler is not None:
-                handler(sec, nanosec, vector.positions, vector.velocities)
+                velocities = vector.velocities if self._plain_only else None
+                handler(sec, nanosec, vector.positions, velocities)
 
     def _remember(self, data: bytes, message: JointStateMessage) -> None:
         """Remember the layout of a message, if every chain it touches is wholly in it."""
+        if len(data) > _LARGEST_REMEMBERED:
+            return
         names = set(message.names)
         if len(names) != len(message.names) or not len(names) <= len(message.positions) > 0:
             return
@@ -181,7 +207,6 @@ class JointStream:
             if 0 < len(names.intersection(chain.joint_names)) < len(chain.joint_names):
                 return
         if len(self._layouts) >= _REMEMBERED_LAYOUTS:
-            self.settle()
             self._layouts.clear()
         self._layout = _Layout(data, message, self._input.chains)
         self._layouts.append(self._layout)

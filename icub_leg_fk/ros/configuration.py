@@ -1,0 +1,106 @@
+"""What the node's parameters amount to: chains to publish and how; free of rclpy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.util import find_spec
+import math
+from typing import Any
+
+from icub_leg_fk.errors import LegFKError, ParameterError
+from icub_leg_fk.kinematics import Catalog, Chain
+from icub_leg_fk.kinematics.catalog import FOOT_FRAMES
+
+STAMP_SOURCES = ('message', 'now')
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """A valid set of parameters.
+
+    Attributes:
+        chains: the chains to publish, in the foot frame asked for.
+        notes: what a user should know of this choice, one line each.
+        frame_prefix: put before every frame id.
+        joint_timeout: greatest age of a joint beside the newest of its chain [s]; 0 is none.
+        stamp_now: whether poses are stamped with the node's time instead of the message's.
+        publish_tf: whether transforms are broadcast.
+        publish_twist: whether twists are published.
+        publish_markers: whether skeletons are published.
+    """
+
+    chains: tuple[Chain, ...]
+    notes: tuple[str, ...]
+    frame_prefix: str
+    joint_timeout: float
+    stamp_now: bool
+    publish_tf: bool
+    publish_twist: bool
+    publish_markers: bool
+
+    @classmethod
+    def from_parameters(cls, values: Mapping[str, Any], catalog: Catalog) -> Configuration:
+        """Check the values of all parameters together.
+
+        Args:
+            values: parameter values by name, in their declared types.
+            catalog: the catalog that `kinematics_file` names.
+
+        Raises:
+            ParameterError: a value cannot be used; names the parameter, what was found and what
+                is allowed.
+        """
+        names = values['chains']
+        if not names or len(set(names)) != len(names):
+            raise ParameterError(f'parameter chains: found {list(names or ())}, allowed: one or more of '
+                                 f'{", ".join(catalog.chains)}, each once')
+        _check_choice('foot_frame', values['foot_frame'], FOOT_FRAMES)
+        _check_choice('stamp_source', values['stamp_source'], STAMP_SOURCES)
+        timeout, prefix = values['joint_timeout'], values['frame_prefix']
+        if not 0.0 <= timeout < math.inf:
+            raise ParameterError(f'parameter joint_timeout: found {timeout}, '
+                                 'allowed: seconds from 0 on, 0 is none')
+        if not prefix.isprintable() or ' ' in prefix:
+            raise ParameterError(f'parameter frame_prefix: found {prefix!r}, '
+                                 'allowed: printable characters other than space')
+        if values['publish_tf'] and find_spec('tf2_ros') is None:
+            raise ParameterError('parameter publish_tf: found true without the package tf2_ros, '
+                                 'allowed: false, or install tf2_ros')
+        chains = tuple(_chain(name, values, catalog) for name in names)
+        return cls(
+            chains=chains,
+            notes=tuple(f'{chain.name} has no sole; its pose is that of {prefix}{chain.tip_frame}'
+                        for chain in chains
+                        if values['foot_frame'] not in catalog.entry(chain.name).tip_frames),
+            frame_prefix=prefix,
+            joint_timeout=timeout,
+            stamp_now=values['stamp_source'] == 'now',
+            publish_tf=values['publish_tf'],
+            publish_twist=values['publish_twist'],
+            publish_markers=values['publish_markers'],
+        )
+
+
+def version_parameter(chain: str) -> str:
+    """Return the name of the parameter that holds a chain's own version."""
+    return f'{chain}.version'
+
+
+def _check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
+    if value not in choices:
+        raise ParameterError(
+            f'parameter {name}: found {value!r}, allowed: {" or ".join(choices)}')
+
+
+def _chain(name: str, values: Mapping[str, Any], catalog: Catalog) -> Chain:
+    parameter = 'chains'
+    try:
+        entry = catalog.entry(name)
+        own = version_parameter(name)
+        parameter = own if values.get(own) else 'version'
+        foot_frame = values['foot_frame'] if values['foot_frame'] in entry.tip_frames else 'dh'
+        return catalog.chain(name, values[parameter], foot_frame)
+    except LegFKError as error:
+        hint = '' if parameter != 'version' else f' (or set {version_parameter(name)})'
+        raise ParameterError(f'parameter {parameter}: {error}{hint}') from error

@@ -1,0 +1,178 @@
+"""The node's output topics: one function per chain that turns joint vectors into messages.
+
+A topic that nobody subscribes to costs nothing: the middleware tells when a subscriber comes or
+goes, and only then is it decided anew which messages a chain's joint vectors become.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import PoseStamped, TransformStamped, TwistStamped
+from rclpy.event_handler import PublisherEventCallbacks, UnsupportedEventTypeError
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos_overriding_options import QoSOverridingOptions, QoSPolicyKind
+
+from icub_leg_fk.kinematics import Chain
+from icub_leg_fk.ros.configuration import Configuration
+from icub_leg_fk.ros.joint_stream import OnReady
+from icub_leg_fk.ros.pose_cdr import PoseStampedEncoder
+from icub_leg_fk.ros.twist import tip_twist
+
+_DEPTH = 10
+OVERRIDABLE = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY,
+               QoSPolicyKind.DURABILITY)
+
+
+class Outputs:
+    """Publishers of all chains, kept while their topics are configured.
+
+    Args:
+        node: the node that owns the publishers.
+        on_change: called when a subscriber has come or gone.
+        no_velocity: called with a chain's index when a twist could not be computed.
+    """
+
+    def __init__(self, node: Node, on_change: Callable[[], None],
+                 no_velocity: Callable[[int], None]) -> None:
+        self._node = node
+        self._on_change = on_change
+        self._no_velocity = no_velocity
+        self._publishers: dict[str, Publisher] = {}
+        self._events_supported = True
+        self._broadcaster: Any = None
+        self._configuration: Configuration | None = None
+
+    def configure(self, configuration: Configuration) -> None:
+        """Create the publishers that are needed and destroy those that are not."""
+        topics: dict[str, Any] = {}
+        for chain in configuration.chains:
+            topics[f'~/{chain.tip}/pose'] = PoseStamped
+            if configuration.publish_twist:
+                topics[f'~/{chain.tip}/twist'] = TwistStamped
+        if configuration.publish_markers:
+            from visualization_msgs.msg import MarkerArray
+            topics['~/skeleton'] = MarkerArray
+        for topic in self._publishers.keys() - topics.keys():
+            self._node.destroy_publisher(self._publishers.pop(topic))
+        for topic, message_type in topics.items():
+            if topic not in self._publishers:
+                self._publishers[topic] = self._create(topic, message_type)
+        if configuration.publish_tf and self._broadcaster is None:
+            from tf2_ros import TransformBroadcaster
+            self._broadcaster = TransformBroadcaster(self._node)
+        self._configuration = configuration
+
+    def handlers(self) -> list[OnReady | None]:
+        """Return what to do with each chain's joint vectors, None where nobody wants them."""
+        if self._configuration is None:
+            return []
+        return [self._handler(index, chain, self._configuration)
+                for index, chain in enumerate(self._configuration.chains)]
+
+    def _create(self, topic: str, message_type: Any) -> Publisher:
+        options = QoSOverridingOptions(policy_kinds=OVERRIDABLE)
+        if self._events_supported:
+            events = PublisherEventCallbacks(matched=lambda info: self._on_change())
+            try:
+                return self._node.create_publisher(message_type, topic, _DEPTH,
+                                                   event_callbacks=events,
+                                                   qos_overriding_options=options)
+            except UnsupportedEventTypeError:
+                self._events_supported = False
+        return self._node.create_publisher(message_type, topic, _DEPTH,
+                                           qos_overriding_options=options)
+
+    def _wanted(self, topic: str) -> bool:
+        publisher = self._publishers.get(topic)
+        return publisher is not None and (
+            not self._events_supported or publisher.get_subscription_count() > 0)
+
+    def _handler(self, index: int, chain: Chain, configuration: Configuration) -> OnReady | None:
+        steps: list[OnReady] = []
+        if self._wanted(topic := f'~/{chain.tip}/pose'):
+            steps.append(self._pose_step(chain, configuration, self._publishers[topic].publish))
+        if self._wanted(topic := f'~/{chain.tip}/twist'):
+            steps.append(self._twist_step(index, chain, configuration,
+                                          self._publishers[topic].publish))
+        if configuration.publish_tf:
+            steps.append(self._tf_step(chain, configuration))
+        if self._wanted('~/skeleton'):
+            steps.append(self._skeleton_step(chain, configuration))
+        if configuration.stamp_now:
+            steps = [self._restamped(step) for step in steps]
+        if len(steps) <= 1:
+            return steps[0] if steps else None
+        return _all_of(steps)
+
+    def _restamped(self, step: OnReady) -> OnReady:
+        now = self._node.get_clock().now
+
+        def restamped(sec: int, nanosec: int, q: Sequence[float],
+                      qdot: Sequence[float] | None) -> None:
+            step(*divmod(now().nanoseconds, 1_000_000_000), q, qdot)
+        return restamped
+
+    def _pose_step(self, chain: Chain, configuration: Configuration,
+                   publish: Callable[[bytes], None]) -> OnReady:
+        encode = PoseStampedEncoder(configuration.frame_prefix + chain.root_frame).encode
+        pose = chain.pose
+
+        def publish_pose(sec: int, nanosec: int, q: Sequence[float],
+                         qdot: Sequence[float] | None) -> None:
+            publish(encode(sec, nanosec, pose(q)))
+        return publish_pose
+
+    def _twist_step(self, index: int, chain: Chain, configuration: Configuration,
+                    publish: Callable[[TwistStamped], None]) -> OnReady:
+        frame_id = configuration.frame_prefix + chain.root_frame
+
+        def publish_twist(sec: int, nanosec: int, q: Sequence[float],
+                          qdot: Sequence[float] | None) -> None:
+            if qdot is None:
+                self._no_velocity(index)
+                return
+            message = TwistStamped()
+            message.header.frame_id = frame_id
+            message.header.stamp = Time(sec=sec, nanosec=nanosec)
+            linear, angular = message.twist.linear, message.twist.angular
+            (linear.x, linear.y, linear.z,
+             angular.x, angular.y, angular.z) = tip_twist(chain, q, qdot)
+            publish(message)
+        return publish_twist
+
+    def _tf_step(self, chain: Chain, configuration: Configuration) -> OnReady:
+        prefix = configuration.frame_prefix
+        send = self._broadcaster.sendTransform
+
+        def broadcast(sec: int, nanosec: int, q: Sequence[float],
+                      qdot: Sequence[float] | None) -> None:
+            message = TransformStamped(child_frame_id=prefix + chain.tip_frame)
+            message.header.frame_id = prefix + chain.root_frame
+            message.header.stamp = Time(sec=sec, nanosec=nanosec)
+            translation, rotation = message.transform.translation, message.transform.rotation
+            (translation.x, translation.y, translation.z,
+             rotation.x, rotation.y, rotation.z, rotation.w) = chain.pose(q)
+            send(message)
+        return broadcast
+
+    def _skeleton_step(self, chain: Chain, configuration: Configuration) -> OnReady:
+        from icub_leg_fk.ros.skeleton import skeleton_markers
+        publish = self._publishers['~/skeleton'].publish
+
+        def publish_skeleton(sec: int, nanosec: int, q: Sequence[float],
+                             qdot: Sequence[float] | None) -> None:
+            publish(skeleton_markers(chain, q, Time(sec=sec, nanosec=nanosec),
+                                     configuration.frame_prefix))
+        return publish_skeleton
+
+
+def _all_of(steps: Sequence[OnReady]) -> OnReady:
+    def do_all(sec: int, nanosec: int, q: Sequence[float],
+               qdot: Sequence[float] | None) -> None:
+        for step in steps:
+            step(sec, nanosec, q, qdot)
+    return do_all

@@ -1,0 +1,164 @@
+"""The node's parameters: declared with type, description and bounds; changed all or nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
+from rclpy.exceptions import ParameterException, ParameterUninitializedException
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from icub_leg_fk.errors import LegFKError, ParameterError
+from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.kinematics.catalog import FOOT_FRAMES
+from icub_leg_fk.ros.configuration import STAMP_SOURCES, Configuration, version_parameter
+
+_LONGEST_TIMEOUT = 1e6  # s
+
+
+class _Parameter(NamedTuple):
+    name: str
+    default: Any
+    description: str
+    constraints: str = ''
+    largest: float | None = None
+
+
+_PARAMETERS = (
+    _Parameter('chains', ['left_leg', 'right_leg'], 'Chains whose tip poses are published.',
+               'names of chains in the kinematics file, each once'),
+    _Parameter('version', 'v2_5', 'Version of every chain that sets none of its own.',
+               'a version in the kinematics file'),
+    _Parameter('kinematics_file', '', 'Kinematics file to read; empty is the shipped one.',
+               'path of a YAML file'),
+    _Parameter('foot_frame', 'dh', 'Axes of the tip: the table\'s last frame, or the sole.',
+               ' or '.join(FOOT_FRAMES)),
+    _Parameter('frame_prefix', '', 'Put before every frame id.', 'printable, no space'),
+    _Parameter('joint_timeout', 0.5, 'Age of a joint beside the newest of its chain above which '
+               'the chain is held back [s]; 0 turns this off.', '', _LONGEST_TIMEOUT),
+    _Parameter('stamp_source', 'message', 'Stamp of the poses: the message\'s, or the node\'s '
+               'time; a zero message stamp always becomes the node\'s time.',
+               ' or '.join(STAMP_SOURCES)),
+    _Parameter('publish_tf', False, 'Also broadcast the poses as transforms (needs tf2_ros).'),
+    _Parameter('publish_twist', False, 'Also publish the velocity of the tips.'),
+    _Parameter('publish_markers', False, 'Also publish the skeletons for RViz and Foxglove.'),
+)
+_FOREIGN = ('use_sim_time', 'start_type_description_service')
+
+
+class NodeParameters:
+    """Declares the node's parameters and turns every valid set of them into a configuration.
+
+    Args:
+        node: the node.
+        apply: called with each new configuration, after the parameters have been set.
+
+    Attributes:
+        configuration: the present configuration.
+
+    Raises:
+        ParameterError: a parameter given at start is unknown or cannot be used.
+        CatalogError: the kinematics file cannot be used.
+    """
+
+    def __init__(self, node: Node, apply: Callable[[Configuration], None]) -> None:
+        self._node = node
+        self._apply = apply
+        self._declaring = True
+        for parameter in _PARAMETERS:
+            self._declare(parameter)
+        self._catalog = Catalog.load(node.get_parameter('kinematics_file').value)
+        self._declare_versions()
+        self._refuse_unknown()
+        self.configuration = Configuration.from_parameters(self._values(), self._catalog)
+        self._declaring = False
+        self._candidate: tuple[Catalog, Configuration] | None = None
+        node.add_on_set_parameters_callback(self._check)
+        node.add_post_set_parameters_callback(self._adopt)
+
+    def _declare(self, parameter: _Parameter) -> None:
+        descriptor = ParameterDescriptor(description=parameter.description,
+                                         additional_constraints=parameter.constraints)
+        if parameter.largest is not None:
+            descriptor.floating_point_range = [
+                FloatingPointRange(from_value=0.0, to_value=parameter.largest, step=0.0)]
+        try:
+            self._node.declare_parameter(parameter.name, parameter.default, descriptor)
+        except ParameterException as error:
+            overrides = self._node._parameter_overrides
+            raise ParameterError(
+                f'parameter {parameter.name}: found {overrides[parameter.name].value!r}, allowed: '
+                f'{parameter.constraints or _kind(parameter)}') from error
+
+    def _declare_versions(self) -> None:
+        for chain, entry in self._catalog.chains.items():
+            if not self._node.has_parameter(version_parameter(chain)):
+                self._declare(_Parameter(
+                    version_parameter(chain), '', f'Version of {chain}; empty is that of version.',
+                    f'{", ".join(entry.versions)}, or empty'))
+
+    def _refuse_unknown(self) -> None:
+        """Refuse overrides that name no parameter, which rclpy would pass over in silence."""
+        known = [*(parameter.name for parameter in _PARAMETERS),
+                 *map(version_parameter, self._catalog.chains), *_FOREIGN]
+        for name in self._node._parameter_overrides:
+            if name not in known and not name.startswith('qos_overrides.'):
+                raise ParameterError(f'parameter {name}: found no such parameter, allowed: '
+                                     f'{", ".join(known)}')
+
+    def _values(self) -> dict[str, Any]:
+        names = [*(parameter.name for parameter in _PARAMETERS),
+                 *map(version_parameter, self._catalog.chains)]
+        return {name: self._value(name) for name in names if self._node.has_parameter(name)}
+
+    def _value(self, name: str) -> Any:
+        try:
+            return self._node.get_parameter(name).value
+        except ParameterUninitializedException:  # rclpy takes an empty list for no value
+            return None
+
+    def _check(self, changes: Sequence[Parameter]) -> SetParametersResult:
+        """Refuse a set of changes that gives no valid configuration; changes nothing."""
+        self._candidate = None
+        if self._declaring:
+            return SetParametersResult(successful=True)
+        values = self._values()
+        ours = {change.name: change for change in changes if change.name in values
+                or change.name.endswith('.version')}
+        for name, change in ours.items():
+            if change.type_ is Parameter.Type.NOT_SET:
+                return SetParametersResult(successful=False,
+                                           reason=f'parameter {name} cannot be deleted')
+            values[name] = change.value
+        if not ours:
+            return SetParametersResult(successful=True)
+        try:
+            catalog = self._catalog
+            if 'kinematics_file' in ours:
+                catalog = Catalog.load(values['kinematics_file'])
+            self._candidate = catalog, Configuration.from_parameters(values, catalog)
+        except LegFKError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _adopt(self, changes: Sequence[Parameter]) -> None:
+        """Take over what `_check` has found valid."""
+        if self._candidate is None:
+            return
+        (catalog, self.configuration), self._candidate = self._candidate, None
+        dropped = self._catalog.chains.keys() - catalog.chains.keys()
+        self._catalog = catalog
+        self._declaring = True
+        for chain in dropped:
+            self._node.undeclare_parameter(version_parameter(chain))
+        self._declare_versions()
+        self._declaring = False
+        self._apply(self.configuration)
+
+
+def _kind(parameter: _Parameter) -> str:
+    if parameter.largest is not None:
+        return f'a number with a decimal point from 0.0 to {parameter.largest}'
+    return 'true or false'
