@@ -139,7 +139,7 @@ class JointStream:
                 or (fields[0], fields[-2], fields[-1]) != layout.fixed):
             self._feed_plain(data)
             return
-        for position, (lower, upper) in zip(fields[_FIRST:], layout.bounds):  # noqa: B905
+        for position, (lower, upper) in zip(fields[_FIRST:], layout.bounds):
             if not lower <= position <= upper:
                 usable = [abs(value) <= _LARGEST for value in fields[_FIRST:-2]]
                 if not all(usable):
