@@ -5,10 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+import math
 
 from icub_leg_fk.errors import JointVectorError, LegFKError
 from icub_leg_fk.kinematics.link import DHLink
-from icub_leg_fk.kinematics.rotation import Array, is_rigid_transform, quaternion_to_matrix
+from icub_leg_fk.kinematics.rotation import (
+    Array,
+    is_rigid_transform,
+    nearest_rotation,
+    quaternion_to_matrix,
+)
 from icub_leg_fk.kinematics.solver import Pose, PoseSolver
 import numpy as np
 from numpy.typing import ArrayLike
@@ -56,6 +62,7 @@ class Chain:
             T = np.array(getattr(self, name), dtype=float)
             if T.shape != (4, 4) or not is_rigid_transform(T):
                 raise LegFKError(f'chain {self.name}: {name} is no rigid 4x4 transform')
+            T[:3, :3] = nearest_rotation(T[:3, :3])
             T.flags.writeable = False
             object.__setattr__(self, name, T)
 
@@ -185,12 +192,14 @@ class Chain:
         try:
             values = np.asarray(q, dtype=float)
         except (TypeError, ValueError) as error:
-            msg = f'joint vector: found {q!r}, allowed: {shape} numbers'
+            msg = f'joint vector: found a {type(q).__name__}, allowed: {shape} numbers'
             raise JointVectorError(msg) from error
         if values.ndim != ndim or values.shape[-1] != n:
             msg = f'joint vector: found shape {values.shape}, allowed: {shape}'
             raise JointVectorError(msg)
-        if not np.isfinite(values).all():
+        with np.errstate(all='ignore'):
+            maybe_bad = not math.isfinite(values.sum())  # a mask as large as Q only if it may be
+        if maybe_bad and not np.isfinite(values).all():
             index = tuple(np.argwhere(~np.isfinite(values))[0].tolist())
             msg = (f'joint vector: found q[{", ".join(map(str, index))}] = {values[index]}, '
                    'allowed: finite numbers')

@@ -100,3 +100,14 @@ def is_rigid_transform(T: Array, tolerance: float = 1e-6) -> bool:
         and np.allclose(R @ R.T, np.eye(3), atol=tolerance)
         and np.linalg.det(R) > 0
     )
+
+
+def nearest_rotation(R: Array) -> Array:
+    """Return the rotation nearest to a (3, 3) matrix that was rounded when it was written down.
+
+    A matrix that is a rotation to the last digit, as of right angles, comes back untouched.
+    """
+    if np.array_equal(R @ R.T, np.eye(3)):
+        return R
+    U, _, Vt = np.linalg.svd(R)
+    return np.asarray(U @ Vt)

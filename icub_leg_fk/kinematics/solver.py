@@ -1,73 +1,29 @@
 """Tip pose of a DH chain, fast: one joint vector in scalars, many joint vectors in numpy blocks.
 
-A rotation is held as the first column (u, v) of its SU(2) matrix, with the quaternion
-w = Re u, z = -Im u, y = Re v, x = -Im v. Walking from the tip to the root, link i acts on it as
-
-    Rx(alpha):  (u, v) <- (u + k v, v + k u)      k = -i tan(alpha / 2)
-    Rz(theta):  (u, v) <- (u, E v)                E = exp(i theta)
-
-times the common factor cos(alpha / 2) exp(-i theta / 2). Common factors commute with everything
-that follows, so they are collected and applied once at the end. Where |tan| > 1 the roles of u
-and v are swapped and k = i cot(alpha / 2), so that nothing overflows at alpha = pi.
-
-This equals the product of the 4x4 matrices (`Chain.forward`), which the tests hold it to.
+Both walk from the tip to the root as `walk.py` describes. The result equals the product of the
+4x4 matrices (`Chain.forward`), which the tests hold it to.
 """
 
 from __future__ import annotations
 
-import cmath
 from collections.abc import Sequence
+from functools import cache
 import math
-from typing import NamedTuple
+import reprlib
 
 from icub_leg_fk.errors import JointVectorError
 from icub_leg_fk.kinematics.link import DHLink
-from icub_leg_fk.kinematics.rotation import (
-    Array,
-    canonical_quaternion,
-    cos_sin,
-    matrix_to_quaternion,
-)
+from icub_leg_fk.kinematics.rotation import Array, canonical_quaternion
+from icub_leg_fk.kinematics.walk import walk_to_root
 import numpy as np
 
 BLOCK = 4096  # rows worked on at once: a dozen such arrays stay in the L2 cache
 
 Pose = tuple[float, float, float, float, float, float, float]
+Scalars = Array | float
 
-
-class _Step(NamedTuple):
-    """What one link does on the way from tip to root; `E` is None if its joint turns."""
-
-    E: complex | None
-    offset: float
-    k: complex
-    swap: bool
-    cos_alpha: float
-    sin_alpha: float
-    a: float
-    d: float
-
-
-def _step(link: DHLink) -> tuple[_Step, complex]:
-    """Return the step of a link and the constant factor it leaves for the end."""
-    half_cos, half_sin = cos_sin(link.alpha / 2)
-    swap = abs(half_sin) > abs(half_cos)
-    if swap:
-        k, factor = complex(0.0, half_cos / half_sin), complex(0.0, -half_sin)
-    elif abs(half_sin) == abs(half_cos):
-        k, factor = complex(0.0, -math.copysign(1.0, half_sin * half_cos)), complex(half_cos, 0.0)
-    else:
-        k, factor = complex(0.0, -half_sin / half_cos), complex(half_cos, 0.0)
-    E = None
-    if link.is_prismatic:
-        E = complex(*cos_sin(link.offset))
-        factor *= cmath.rect(1.0, -link.offset / 2)
-    return _Step(E, link.offset, k, swap, *cos_sin(link.alpha), link.a, link.d), factor
-
-
-def _su2_column(rotation: Array) -> tuple[complex, complex]:
-    x, y, z, w = matrix_to_quaternion(rotation).tolist()
-    return complex(w, -z), complex(y, -x)
+_INF = math.inf
+_TOO_LARGE = 'joint vector: found values too large to compute with, allowed: finite numbers'
 
 
 class PoseSolver:
@@ -80,13 +36,7 @@ class PoseSolver:
     """
 
     def __init__(self, links: Sequence[DHLink], T_root_0: Array, T_n_tip: Array) -> None:
-        steps, factors = zip(*map(_step, reversed(links)), strict=True)
-        self._steps: tuple[_Step, ...] = steps
-        self._tip = (*T_n_tip[:3, 3].tolist(), *_su2_column(T_n_tip[:3, :3]))
-        self._root = tuple(map(tuple, T_root_0[:3].tolist()))
-        u, v = _su2_column(T_root_0[:3, :3])
-        factor = math.prod(factors, start=complex(1.0))
-        self._su2_root = (factor * u, -factor * v.conjugate(), factor * v, factor * u.conjugate())
+        self._steps, self._start, self._end = walk_to_root(links, T_root_0, T_n_tip)
 
     def pose(self, q: Sequence[float]) -> Pose:
         """Return x, y, z [m] and qx, qy, qz, qw (norm 1, w >= 0) for one joint vector.
@@ -99,46 +49,53 @@ class PoseSolver:
         """
         if len(q) != len(self._steps):
             raise self._refusal(q)
-        x, y, z, u, v = self._tip
+        x, y, z, qx, qy, qz, qw = self._start
         turned = 0.0
-        rect = cmath.rect
+        cos, sin = math.cos, math.sin
         try:
-            for qi, (E, offset, k, swap, ca, sa, a, d) in zip(reversed(q), self._steps):
-                if swap:
-                    u, v = v, u
-                u, v = u + k * v, v + k * u
-                y, z = ca * y - sa * z, sa * y + ca * z
-                if E is None:
+            for qi, (turn, offset, d, a, right, ca, sa, ch, sh) in zip(reversed(q), self._steps):
+                if turn is None:
                     theta = qi + offset
                     turned += theta
-                    E = rect(1.0, theta)
+                    c = cos(theta)
+                    s = sin(theta)
                 else:
+                    c, s = turn
                     z += qi
-                v *= E
-                c = E.real
-                s = E.imag
-                x += a
                 x, y = c * x - s * y, s * x + c * y
+                qx, qy = c * qx - s * qy, s * qx + c * qy
                 z += d
-        except (ValueError, TypeError) as error:
+                x += a
+                if right == 0.0:
+                    y, z = ca * y - sa * z, sa * y + ca * z
+                    qw, qx = ch * qw - sh * qx, sh * qw + ch * qx
+                    qy, qz = ch * qy - sh * qz, sh * qy + ch * qz
+                elif right > 0.0:
+                    y, z = -z, y
+                    qw, qx = qw - qx, qw + qx
+                    qy, qz = qy - qz, qy + qz
+                else:
+                    y, z = z, -y
+                    qw, qx = qw + qx, qx - qw
+                    qy, qz = qy + qz, qz - qy
+            c = cos(0.5 * turned)
+            s = sin(0.5 * turned)
+            qw, qz = c * qw - s * qz, s * qw + c * qz
+            qx, qy = c * qx + s * qy, c * qy - s * qx
+            c, s, tx, ty, tz = self._end
+            qx, qy = c * qx - s * qy, s * qx + c * qy
+            x, y, z = c * x - s * y + tx, s * x + c * y + ty, z + tz
+            if not -_INF < x + y + z < _INF:
+                raise self._refusal(q)
+        except (ArithmeticError, TypeError, ValueError) as error:
             raise self._refusal(q) from error
-        (r00, r01, r02, tx), (r10, r11, r12, ty), (r20, r21, r22, tz) = self._root
-        m00, m01, m10, m11 = self._su2_root
-        phase = rect(1.0, -0.5 * turned)
-        u, v = (m00 * u + m01 * v) * phase, (m10 * u + m11 * v) * phase
-        x, y, z = (r00 * x + r01 * y + r02 * z + tx, r10 * x + r11 * y + r12 * z + ty,
-                   r20 * x + r21 * y + r22 * z + tz)
-        w = u.real
-        if not -math.inf < x + y + z + w < math.inf:
-            raise self._refusal(q)
-        # Adding 0.0 turns a negative zero into zero.
-        if w > 0.0:
-            return (x + 0.0, y + 0.0, z + 0.0,
-                    0.0 - v.imag, v.real + 0.0, 0.0 - u.imag, w)
-        if w < 0.0:
-            return x + 0.0, y + 0.0, z + 0.0, v.imag + 0.0, 0.0 - v.real, u.imag + 0.0, -w
-        qx, qy, qz, w = canonical_quaternion((-v.imag, v.real, -u.imag, w)).tolist()
-        return x + 0.0, y + 0.0, z + 0.0, qx, qy, qz, w
+        # Adding to or taking from 0.0 leaves no negative zero.
+        if qw > 0.0:
+            return x, y, z, 0.0 + qx, 0.0 + qy, 0.0 + qz, qw
+        if qw < 0.0:
+            return x, y, z, 0.0 - qx, 0.0 - qy, 0.0 - qz, -qw
+        qx, qy, qz, qw = canonical_quaternion((qx, qy, qz, qw)).tolist()
+        return x, y, z, qx, qy, qz, qw
 
     def poses(self, Q: Array, *, libm: bool = False) -> Array:
         """Return the poses of many joint vectors.
@@ -150,93 +107,103 @@ class PoseSolver:
 
         Returns:
             (N, 7) rows x, y, z [m], qx, qy, qz, qw.
+
+        Raises:
+            JointVectorError: a joint position is too large to compute with.
         """
         out = np.empty((len(Q), 7))
-        for start in range(0, len(Q), BLOCK):
-            rows = slice(start, start + BLOCK)
-            self._block(np.ascontiguousarray(Q[rows].T), out[rows].T, libm)
+        with np.errstate(over='ignore', invalid='ignore'):
+            for start in range(0, len(Q), BLOCK):
+                rows = slice(start, start + BLOCK)
+                poses = self._block(Q[rows].T.copy(), libm)
+                if not np.isfinite(poses).all():
+                    raise JointVectorError(_TOO_LARGE)
+                out[rows] = poses.T
         return out
 
-    def _block(self, Q: Array, out: Array, libm: bool) -> None:
-        """Fill the (7, N) `out` from the (n, N) `Q`; the formulas of `pose`, term by term."""
-        x, y, z, u, v = self._tip
-        ur, ui, vr, vi = u.real, u.imag, v.real, v.imag
-        turned = 0.0
+    def _block(self, Q: Array, libm: bool) -> Array:
+        """Return the (7, N) poses of the (n, N) `Q`; the formulas of `pose`, term by term."""
+        values: tuple[Scalars, ...] = self._start
+        x, y, z, qx, qy, qz, qw = values
+        turned: Scalars = 0.0
+        c: Scalars
+        s: Scalars
         for qi, step in zip(Q[::-1], self._steps, strict=True):
-            if step.swap:
-                ur, ui, vr, vi = vr, vi, ur, ui
-            ur, ui, vr, vi = _mix(step.k.imag, ur, ui, vr, vi)
-            y, z = _rotate(step.cos_alpha, step.sin_alpha, y, z)
-            if step.E is None:
+            if step.turn is None:
                 theta = qi + step.offset
                 turned = turned + theta
                 c, s = _cos_sin_many(theta, libm)
             else:
-                c, s = step.E.real, step.E.imag
+                c, s = step.turn
                 z = z + qi
-            vr, vi = vr * c - vi * s, vr * s + vi * c
-            x = x + step.a if step.a else x
-            x, y = c * x - s * y, s * x + c * y
+            x, y = _rotate(c, s, x, y)
+            qx, qy = _rotate(c, s, qx, qy)
             z = z + step.d if step.d else z
-        c, s = _cos_sin_many(np.broadcast_to(-0.5 * turned, Q.shape[1:]), libm)
-        m00, m01, m10, m11 = self._su2_root
-        ur, ui, vr, vi = (*_combine(m00, ur, ui, m01, vr, vi), *_combine(m10, ur, ui, m11, vr, vi))
-        for row, (rx, ry, rz, t) in zip(out, self._root):
-            row[:] = rx * x + ry * y + rz * z + t
-        out[3] = -(vr * s + vi * c)
-        out[4] = vr * c - vi * s
-        out[5] = -(ur * s + ui * c)
-        out[6] = ur * c - ui * s
-        flip = out[6] < 0
-        np.negative(out[3:], out=out[3:], where=flip)
-        out += 0.0
+            x = x + step.a if step.a else x
+            y, z = _rotate(step.cos_alpha, step.sin_alpha, y, z)
+            if step.right == 0.0:
+                qw, qx = _rotate(step.cos_half_alpha, step.sin_half_alpha, qw, qx)
+                qy, qz = _rotate(step.cos_half_alpha, step.sin_half_alpha, qy, qz)
+            elif step.right > 0.0:
+                qw, qx = qw - qx, qw + qx
+                qy, qz = qy - qz, qy + qz
+            else:
+                qw, qx = qw + qx, qx - qw
+                qy, qz = qy + qz, qz - qy
+        c, s = _cos_sin_many(np.full(Q.shape[1], 0.5) * turned, libm)
+        qw, qz = _rotate(c, s, qw, qz)
+        qx, qy = c * qx + s * qy, c * qy - s * qx
+        c, s, tx, ty, tz = self._end
+        qx, qy = _rotate(c, s, qx, qy)
+        x, y = _rotate(c, s, x, y)
+        out = np.empty((7, Q.shape[1]))
+        for row, value in zip(out, (x + tx, y + ty, z + tz, qx, qy, qz, qw)):
+            row[:] = value
+        out[3:] *= np.copysign(1.0, out[6])
+        out[3:] += 0.0
         zero = out[6] == 0
         if zero.any():
             out[3:, zero] = canonical_quaternion(out[3:, zero].T).T
+        return out
 
     def _refusal(self, q: Sequence[float]) -> JointVectorError:
         n = len(self._steps)
         if len(q) != n:
             return JointVectorError(f'joint vector: found {len(q)} values, allowed: {n}')
         bad = [i for i, value in enumerate(q)
-               if not isinstance(value, (int, float)) or not math.isfinite(value)]
-        where = ', '.join(f'q[{i}] = {q[i]!r}' for i in bad) or 'values too large to compute with'
+               if not isinstance(value, (int, float)) or not -_INF < value < _INF]
+        if not bad:
+            return JointVectorError(_TOO_LARGE)
+        where = ', '.join(f'q[{i}] = {reprlib.repr(q[i])}' for i in bad)
         return JointVectorError(f'joint vector: found {where}, allowed: finite numbers')
-
-
-Scalars = Array | float
 
 
 def _cos_sin_many(theta: Array, libm: bool) -> tuple[Array, Array]:
     if not libm:
+        # numpy vectorises its tangent, but not its cosine and sine, which follow the C library.
+        t = np.tan(0.5 * theta)
+        versed = 2.0 / (1.0 + t * t)  # 1 + cos(theta)
+        return versed - 1.0, t * versed
+    if _numpy_is_libm():
         return np.cos(theta), np.sin(theta)
     angles = theta.tolist()
     return (np.fromiter(map(math.cos, angles), float, len(angles)),
             np.fromiter(map(math.sin, angles), float, len(angles)))
 
 
-def _mix(k: float, ur: Scalars, ui: Scalars, vr: Scalars, vi: Scalars) -> tuple[Scalars, ...]:
-    """(u + i k v, v + i k u), without the multiplications that change nothing."""
-    if k == 0.0:
-        return ur, ui, vr, vi
-    if k == 1.0:
-        return ur - vi, ui + vr, vr - ui, vi + ur
-    if k == -1.0:
-        return ur + vi, ui - vr, vr + ui, vi - ur
-    return ur - k * vi, ui + k * vr, vr - k * ui, vi + k * ur
+@cache
+def _numpy_is_libm() -> bool:
+    """Tell whether this numpy takes cosine and sine from the C library, to the last bit."""
+    angles = np.linspace(-7.0, 7.0, 5000)
+    cosines, sines = np.cos(angles).tolist(), np.sin(angles).tolist()
+    return (cosines, sines) == ([*map(math.cos, angles)], [*map(math.sin, angles)])
 
 
-def _rotate(c: float, s: float, y: Scalars, z: Scalars) -> tuple[Scalars, Scalars]:
-    """Rotate (y, z) by the angle of cosine c and sine s, which is often a right one."""
-    if s == 0.0:
-        return (y, z) if c == 1.0 else (-y, -z)
-    if c == 0.0:
-        return (-z, y) if s == 1.0 else (z, -y)
-    return c * y - s * z, s * y + c * z
-
-
-def _combine(m: complex, ur: Scalars, ui: Scalars, n: complex, vr: Scalars,
-             vi: Scalars) -> tuple[Scalars, Scalars]:
-    """Real and imaginary part of m u + n v, in the order in which complex numbers do it."""
-    return ((m.real * ur - m.imag * ui) + (n.real * vr - n.imag * vi),
-            (m.real * ui + m.imag * ur) + (n.real * vi + n.imag * vr))
+def _rotate(c: Scalars, s: Scalars, x: Scalars, y: Scalars) -> tuple[Scalars, Scalars]:
+    """Turn (x, y) by the angle of cosine c and sine s, which is often a right one."""
+    if isinstance(c, float):
+        if s == 0.0:
+            return (x, y) if c == 1.0 else (-x, -y)
+        if c == 0.0:
+            return (-y, x) if s == 1.0 else (y, -x)
+    return c * x - s * y, s * x + c * y
