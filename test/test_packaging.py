@@ -8,9 +8,8 @@ import subprocess
 import sys
 from xml.etree import ElementTree
 
-import pytest
-
 import icub_leg_fk
+import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 MARKER = Path('share/ament_index/resource_index/packages/icub_leg_fk')
