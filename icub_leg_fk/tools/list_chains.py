@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any
+from typing import Any, TYPE_CHECKING
 
 from icub_leg_fk.tools.chain_arguments import add_json, add_kinematics_file
 

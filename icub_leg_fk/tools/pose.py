@@ -6,8 +6,13 @@ import argparse
 from typing import TYPE_CHECKING
 
 from icub_leg_fk.errors import JointVectorError
-from icub_leg_fk.tools.chain_arguments import add_chain, add_joint_positions, add_json
-from icub_leg_fk.tools.chain_arguments import joint_positions, load_chain
+from icub_leg_fk.tools.chain_arguments import (
+    add_chain,
+    add_joint_positions,
+    add_json,
+    joint_positions,
+    load_chain,
+)
 
 if TYPE_CHECKING:
     from icub_leg_fk.kinematics import Chain
@@ -34,10 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the pose."""
-    import numpy as np
-
     from icub_leg_fk.kinematics import matrix_to_quaternion
     from icub_leg_fk.tools.text import json_text
+    import numpy as np
 
     _, chain = load_chain(args)
     q = joint_positions(args, chain) or []
@@ -57,8 +61,15 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _as_text(chain: Chain, q: list[float], T: Array, quaternion: Array) -> list[str]:
-    from icub_leg_fk.tools.text import columns, fixed, indented, matrix
-    from icub_leg_fk.tools.text import position_text, range_text, wrapped
+    from icub_leg_fk.tools.text import (
+        columns,
+        fixed,
+        indented,
+        matrix,
+        position_text,
+        range_text,
+        wrapped,
+    )
 
     outside = chain.out_of_range(q)
     joints = list(zip(chain.joint_names, chain.links, q, strict=True))

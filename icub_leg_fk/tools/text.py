@@ -44,18 +44,23 @@ def position_in(link: DHLink, position: float) -> tuple[float, int]:
     return (position, 6) if link.is_prismatic else (math.degrees(position), 4)
 
 
-def columns(rows: Rows, gap: str = '  ') -> list[str]:
+def columns(rows: Rows, gap: str = '  ', header: Sequence[str] = ()) -> list[str]:
     """Return the rows as lines, each column as wide as its widest cell.
 
     Numbers stand with their decimal points under each other, other columns on the left.
     """
-    aligned = map(_aligned, zip(*rows, strict=True))
+    aligned = [_aligned(column) for column in zip(*rows, strict=True)]
+    if header:
+        widths = [max(len(title), len(column[0]))
+                  for title, column in zip(header, aligned, strict=True)]
+        aligned = [[cell.ljust(width) for cell in (title, *column)]
+                   for title, column, width in zip(header, aligned, widths, strict=True)]
     return [gap.join(cells).rstrip() for cells in zip(*aligned, strict=True)]
 
 
 def matrix(rows: Rows, gap: str = ' ') -> list[str]:
     """Return the lines of a matrix in brackets."""
-    aligned = [_aligned(column, right=True) for column in zip(*rows, strict=True)]
+    aligned = [_aligned(column, centred=True) for column in zip(*rows, strict=True)]
     return [f'[{gap.join(cells)}]' for cells in zip(*aligned, strict=True)]
 
 
@@ -92,7 +97,7 @@ def _json(value: Any, depth: int) -> str:
     flat = not isinstance(value, (dict, list)) or not any(
         isinstance(item, (dict, list))
         for item in (value.values() if isinstance(value, dict) else value))
-    if flat and not isinstance(value, dict) or not value:
+    if (flat and not isinstance(value, dict)) or not value:
         return json.dumps(value, allow_nan=False)
     inside, outside = '  ' * (depth + 1), '  ' * depth
     if isinstance(value, dict):
@@ -102,15 +107,20 @@ def _json(value: Any, depth: int) -> str:
     return '[\n' + ',\n'.join(inside + item for item in items) + f'\n{outside}]'
 
 
-def _aligned(column: Sequence[str], right: bool = False) -> list[str]:
+def _aligned(column: Sequence[str], centred: bool = False) -> list[str]:
     """Pad the cells of a column to one width."""
     if all(map(_is_number, filter(None, column))):
         decimals = [len(cell) - len(cell.partition('.')[0]) for cell in column]
         column = [cell + ' ' * (max(decimals) - own)
                   for cell, own in zip(column, decimals, strict=True)]
-        right = True
+        width = max(map(len, column))
+        return [cell.rjust(width) for cell in column]
     width = max(map(len, column))
-    return [cell.rjust(width) if right else cell.ljust(width) for cell in column]
+    if not centred:
+        return [cell.ljust(width) for cell in column]
+    # A minus sign hangs out to the left, so that s_0 and -s_0 stand under each other.
+    return [(' ' * ((width - len(cell.lstrip('-'))) // 2 - cell.startswith('-')) + cell)
+            .ljust(width) for cell in column]
 
 
 def _is_number(text: str) -> bool:

@@ -1,0 +1,218 @@
+"""What `leg_fk explain` tells: the Denavit-Hartenberg method, step by step, for one chain.
+
+Lengths are millimetres here, as in the printed tables. Rows count from i = 0, so row i is the
+transform A_i = T_i(i+1) = Rz(theta_i) tz(d_i) tx(a_i) Rx(alpha_i) from frame i+1 to frame i.
+An entry of a matrix is a float, or a sympy expression where the answer is to be exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+import math
+from typing import Any, Protocol
+
+from icub_leg_fk.kinematics import Chain
+from icub_leg_fk.kinematics.catalog_file import ChainEntry
+from icub_leg_fk.kinematics.link import DHLink
+from icub_leg_fk.kinematics.rotation import Array, cos_sin
+import numpy as np
+
+Cell = Any
+Matrix = list[list[Cell]]
+
+# How the iCub's documentation calls the tips; another robot's are E and, with a sole, S.
+TIP_SYMBOLS = {'left_foot': ('Lf', 'Ls'), 'right_foot': ('Rf', 'Rs'), 'head_imu': ('Is', '')}
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of the DH table; `joint` is empty for the virtual link."""
+
+    index: int
+    joint: str
+    link: DHLink
+
+
+@dataclass(frozen=True)
+class Step:
+    """What one row contributes: its values, A_i with its four factors, and T_0(i+1)."""
+
+    row: Row
+    theta: Cell
+    d: Cell
+    a: Cell
+    alpha: Cell
+    factors: tuple[Matrix, Matrix, Matrix, Matrix]
+    A: Matrix
+    T_0: Matrix
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """One chain explained.
+
+    Attributes:
+        chain: the chain.
+        root, tip: symbols of its ends, as in T_RoLf.
+        source: where the table comes from, if it is not the printed documentation.
+        q: the joint vector [rad or m]; None where the joints stay symbols.
+        T_root_0: where frame 0 stands in the root frame.
+        steps: one per row.
+        tips: what follows the last row: name and matrix of T_nIs and of the sole.
+        T_root_tip: the answer.
+        symbols: what each symbol stands for; empty with numbers.
+        frames: (n + 1, 4, 4) frames 0 to n in the root frame [mm], for q or for q = 0.
+    """
+
+    chain: Chain
+    root: str
+    tip: str
+    source: str
+    q: Sequence[float] | None
+    T_root_0: Matrix
+    steps: list[Step]
+    tips: list[tuple[str, Matrix]]
+    T_root_tip: Matrix
+    frames: Array
+    symbols: dict[str, Cell] = field(default_factory=dict)
+
+
+class Algebra(Protocol):
+    """The arithmetic in which a chain is explained: decimals, or sympy."""
+
+    symbols: dict[str, Cell]
+
+    def matrix(self, T: Array) -> Matrix:
+        """Return a constant transform, whose translation is in metres, in mm."""
+
+    def values(self, row: Row, q: float | None) -> tuple[Cell, Cell, Cell, Cell]:
+        """Return theta, d, a, alpha of a row."""
+
+    def cos_sin(self, row: Row, theta: Cell) -> tuple[Cell, Cell]:
+        """Return cosine and sine of a row's theta."""
+
+    def cos_sin_constant(self, angle: Cell) -> tuple[Cell, Cell]:
+        """Return cosine and sine of an angle that is no joint's."""
+
+    def running_products(self, steps: Sequence[Step]) -> list[Matrix]:
+        """Return T_01, T_02, ... T_0n."""
+
+
+class Decimals:
+    """Floats."""
+
+    def __init__(self) -> None:
+        self.symbols: dict[str, Cell] = {}
+
+    def matrix(self, T: Array) -> Matrix:
+        """Return a constant transform, whose translation is in metres, in mm."""
+        return np.vstack((T[:3] * (1, 1, 1, 1000), T[3])).tolist()  # type: ignore[no-any-return]
+
+    def values(self, row: Row, q: float | None) -> tuple[Cell, Cell, Cell, Cell]:
+        """Return theta [rad], d, a [mm], alpha [rad] of a row."""
+        link, position = row.link, q or 0.0
+        slide, turn = (position, 0.0) if link.is_prismatic else (0.0, position)
+        return link.offset + turn, 1000 * (link.d + slide), 1000 * link.a, link.alpha
+
+    def cos_sin(self, row: Row, theta: Cell) -> tuple[Cell, Cell]:
+        """Return cosine and sine of a row's theta."""
+        return cos_sin(theta)
+
+    def cos_sin_constant(self, angle: Cell) -> tuple[Cell, Cell]:
+        """Return cosine and sine of an angle."""
+        return cos_sin(angle)
+
+    def running_products(self, steps: Sequence[Step]) -> list[Matrix]:
+        """Return T_01, T_02, ... T_0n."""
+        products = [steps[0].A]
+        for step in steps[1:]:
+            products.append(product(products[-1], step.A))
+        return products
+
+
+def explanation(entry: ChainEntry, chain: Chain, foot_frame: str, q: Sequence[float] | None,
+                algebra: Algebra) -> Explanation:
+    """Work a chain out, step by step.
+
+    Args:
+        entry: the chain's entry in its catalog.
+        chain: the version and tip frame asked for.
+        foot_frame: that tip frame, `dh` or `sole`.
+        q: joint vector [rad or m], or None to keep the joints as symbols.
+        algebra: the arithmetic.
+    """
+    version = entry.versions[chain.version]
+    steps = _steps(chain, q, algebra)
+    tip, sole = TIP_SYMBOLS.get(chain.tip, ('E', 'S'))
+    tips = []
+    if not np.array_equal(version.T_n_tip, np.eye(4)):
+        tips.append((f'T_n{tip}', algebra.matrix(version.T_n_tip)))
+    if foot_frame != 'dh':
+        tips.append((f'T_{tip}{sole}',
+                     algebra.matrix(entry.tip_frames[foot_frame].T_dh_tip)))
+        tip = sole
+    T_root_0 = algebra.matrix(chain.T_root_0)
+    T_root_tip = product(T_root_0, steps[-1].T_0)
+    for _, T in tips:
+        T_root_tip = product(T_root_tip, T)
+    return Explanation(chain, 'Ro', tip, version.source, q, T_root_0, steps, tips, T_root_tip,
+                       _frames(chain, q), algebra.symbols)
+
+
+def product(A: Matrix, B: Matrix) -> Matrix:
+    """Return the product of two 4x4 matrices of numbers or expressions."""
+    return [[sum((x * y for x, y in zip(row, column, strict=True)), start=0)
+             for column in zip(*B, strict=True)] for row in A]
+
+
+def basic_transforms(theta: tuple[Cell, Cell], d: Cell, a: Cell, alpha: tuple[Cell, Cell]
+                     ) -> tuple[Matrix, Matrix, Matrix, Matrix]:
+    """Return Rz(theta), tz(d), tx(a), Rx(alpha); an angle is given as its cosine and sine."""
+    (ct, st), (ca, sa) = theta, alpha
+    return (
+        [[ct, -st, 0, 0], [st, ct, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]],
+        [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, d], [0, 0, 0, 1]],
+        [[1, 0, 0, a], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]],
+        [[1, 0, 0, 0], [0, ca, -sa, 0], [0, sa, ca, 0], [0, 0, 0, 1]],
+    )
+
+
+def _steps(chain: Chain, q: Sequence[float] | None, algebra: Algebra) -> list[Step]:
+    rows = [Row(i, joint, link)
+            for i, (joint, link) in enumerate(zip(chain.joint_names, chain.links, strict=True))]
+    positions: list[float | None] = [None] * len(rows) if q is None else list(q)
+    if chain.virtual_link is not None:
+        rows.append(Row(len(rows), '', chain.virtual_link))
+        positions.append(0.0)
+    steps = []
+    for row, position in zip(rows, positions, strict=True):
+        theta, d, a, alpha = algebra.values(row, position)
+        factors = basic_transforms(algebra.cos_sin(row, theta), d, a,
+                                   algebra.cos_sin_constant(alpha))
+        Rz, tz, tx, Rx = factors
+        A = product(product(Rz, tz), product(tx, Rx))
+        steps.append(Step(row, theta, d, a, alpha, factors, A, A))
+    products = algebra.running_products(steps)
+    return [Step(s.row, s.theta, s.d, s.a, s.alpha, s.factors, s.A, T)
+            for s, T in zip(steps, products, strict=True)]
+
+
+def _frames(chain: Chain, q: Sequence[float] | None) -> Array:
+    """Return frames 0 to n, the virtual link's included, in the root frame [mm]."""
+    frames = list(chain.frames([0.0] * len(chain.links) if q is None else q)[:-1])
+    if chain.virtual_link is not None:
+        frames.append(frames[-1] @ chain.virtual_link.transform())
+    in_mm: Array = np.array(frames) * (1, 1, 1, 1000)
+    return in_mm
+
+
+def pi_text(angle: float) -> str:
+    """Return an angle [rad] as the tables print it: -pi/2, pi, 0; decimals if it is no such part."""
+    part = Fraction(f'{math.degrees(angle):.12g}') / 180
+    if part.denominator > 180:
+        return f'{angle:.6g}'
+    over, under = abs(part.numerator), part.denominator
+    text = f'{over if over > 1 else ""}pi{f"/{under}" if under > 1 else ""}' if over else '0'
+    return f'-{text}' if part < 0 else text
