@@ -2,12 +2,11 @@
 
 import time
 
-import numpy as np
-import pytest
-
 from icub_leg_fk.errors import UnknownNameError
 from icub_leg_fk.kinematics import Catalog
 from icub_leg_fk.tools.gait import PERIOD, walk
+import numpy as np
+import pytest
 
 RATE = 160.0  # Hz; a period is 200 samples, half a period 100
 # The legs' ranges as printed [deg], hip_roll narrowed by the erratum -17 .. 119.

@@ -8,13 +8,12 @@ The root frame has x backward, y to the robot's right and z up.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.polynomial import Polynomial
-
 from icub_leg_fk.errors import LegFKError
 from icub_leg_fk.kinematics import Catalog, Chain
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.tools.recording import JointRecording
+import numpy as np
+from numpy.polynomial import Polynomial
 
 PERIOD = 1.25  # s, two steps
 STANCE = 0.6  # share of the period a foot stands; above 0.5 both feet stand for a while

@@ -1,0 +1,129 @@
+"""Whole pictures: feet over time with the legs at some instants, and a walk in space."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from typing import TYPE_CHECKING
+
+from icub_leg_fk.kinematics.rotation import Array
+from icub_leg_fk.tools import pictures_legs as legs
+from icub_leg_fk.tools import pictures_time as over_time
+from icub_leg_fk.tools.pictures_style import AXIS_COLORS, color_of, FAINT, INK, label_of, SLIDE
+from icub_leg_fk.tools.recording import ChainTrack
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.figure import Figure
+
+Sample = tuple[ChainTrack, int]
+TRAIL = 0.5  # s of a tip's path before and after an instant
+
+
+def feet_figure(tracks: Sequence[ChainTrack], instants: Sequence[float], title: str,
+                soled: Collection[str]) -> Figure:
+    """Return the tips over time, and below each other the chains in space at some instants.
+
+    Args:
+        tracks: what the chains did; at least one sample each.
+        instants: times [s] at which to draw the chains, at most four.
+        title: what the picture shows.
+        soled: names of the chains that end in a foot.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=SLIDE)
+    found = [(color_of(track.chain), violation) for track in tracks
+             for violation in over_time.violations(track)]
+    left, right, top, bottom = 0.075, 0.52, 0.83, 0.085
+    strip = 0.045 + 0.026 * len(found) if found else 0.0
+    grid = figure.add_gridspec(
+        3 + bool(found), 1, left=left, right=right, top=top, bottom=bottom, hspace=0.42,
+        height_ratios=[1, 1, 1, *([strip / 0.2] if found else [])])
+    panels = [figure.add_subplot(grid[i]) for i in range(3)]
+    over_time.draw_tips(panels, tracks)
+    lowest = panels[-1]
+    if found:
+        lowest = figure.add_subplot(grid[3], sharex=panels[0])
+        over_time.draw_violations(lowest, found)
+        panels[-1].tick_params(labelbottom=False)
+    lowest.set_xlabel('time [s]')
+    over_time.mark_instants(panels, instants)
+    _title(figure, title, tracks)
+    spaces = figure.add_gridspec(
+        -(-len(instants) // 2), min(2, len(instants)), left=0.56, right=0.99, top=top + 0.045,
+        bottom=0.03, wspace=0.02, hspace=0.04)
+    views = [legs.View(figure.add_subplot(spaces[i])) for i in range(len(instants))]
+    scenes = [[(track, int(np.abs(track.times - instant).argmin())) for track in tracks]
+              for instant in instants]
+    floor = _floor([sample for scene in scenes for sample in scene])
+    for view, scene, letter, instant in zip(views, scenes, over_time.letters(), instants):
+        _draw_scene(view, scene, floor, soled)
+        view.axes.set_title(f'{letter}  {instant:.2f} s', x=0.04, y=0.93)
+    _share_limits(views)
+    return figure
+
+
+def _draw_scene(view: legs.View, scene: Sequence[Sample], floor: tuple[Array, Array],
+                soled: Collection[str]) -> None:
+    """Draw the chains as they are at an instant, their tips' paths around it, and the floor."""
+    reach = [track.chain.frames(track.positions[i])[:, :3, 3] for track, i in scene]
+    low = min(float(points[:, 2].min()) for points in reach)
+    xs, ys = floor
+    legs.draw_ground(view, low, xs, ys)
+    legs.draw_forward(view, (xs[0] + 0.16, ys[0], low))
+    legs.draw_ruler(view, xs[0], ys[-1], low)
+    legs.draw_triad(view, np.eye(4), 0.1, 2.4, 60, labels=True)
+    nearness = np.argsort(np.argsort([view.depth(points) for points in reach]))
+    for (track, i), rank in zip(scene, nearness, strict=True):
+        z = 10.0 + 10 * float(rank)
+        around = np.abs(track.times - track.times[i]) <= TRAIL
+        view.line(track.poses[around, :3], color=color_of(track.chain), linewidth=1.2, alpha=0.5,
+                  zorder=z - 1)
+        legs.draw_leg(view, track.chain, track.positions[i], track.chain.name in soled, z)
+        legs.draw_triad(view, track.chain.forward(track.positions[i]), 0.1, 2.2, z + 5)
+
+
+def _floor(samples: Sequence[Sample]) -> tuple[Array, Array]:
+    """Return x and y [m] of the lines of a floor that is under all chains."""
+    points = np.vstack([track.chain.frames(track.positions[i])[:, :2, 3] for track, i in samples])
+    lowest = np.minimum(points.min(axis=0) - (0.1, 0.03), (-0.2, -0.15))
+    highest = np.maximum(points.max(axis=0) + (0.05, 0.03), (0.2, 0.15))
+    return (legs.grid_lines(lowest[0], highest[0]), legs.grid_lines(lowest[1], highest[1]))
+
+
+def _share_limits(views: Sequence[legs.View]) -> None:
+    """Give all views one scale, that of the one that needs most room."""
+    boxes = np.array([view.axes.dataLim.extents for view in views])
+    left, bottom = boxes[:, :2].min(axis=0) - (0.06, 0.04)
+    right, top = boxes[:, 2:].max(axis=0) + (0.01, 0.13)
+    for view in views:
+        view.axes.set_xlim(left, right)
+        view.axes.set_ylim(bottom, top)
+
+
+def _title(figure: Figure, title: str, tracks: Sequence[ChainTrack]) -> None:
+    """Write the title, and below it what colours mean and what else is worth knowing."""
+    figure.text(0.03, 0.955, title, fontsize=19, weight='bold', va='center')
+    words = [(f'● {label_of(track.chain)}', color_of(track.chain)) for track in tracks]
+    notes = [over_time.describe_gaps(tracks)]
+    if not any(over_time.violations(track) for track in tracks):
+        notes.append('all joints inside their documented ranges')
+    words += [(note, FAINT) for note in notes if note]
+    _write_in_colors(figure, 0.03, words)
+    frames = ', '.join(track.chain.tip_frame for track in tracks)
+    _write_in_colors(figure, 0.56, [
+        *((name, color) for name, color in zip('xyz', AXIS_COLORS, strict=True)),
+        (f'of {tracks[0].chain.root_frame}, {frames}', INK), ('squares 0.1 m', FAINT)], 10.5)
+
+
+def _write_in_colors(figure: Figure, x: float, words: Sequence[tuple[str, str]],
+                     size: float = 12.0) -> None:
+    """Write words in colours one after the other, in the line below the title."""
+    from matplotlib.offsetbox import AnchoredOffsetbox, HPacker, TextArea
+
+    parts: list[Artist] = [TextArea(text, textprops={'color': color, 'fontsize': size})
+             for text, color in words]
+    figure.add_artist(AnchoredOffsetbox(
+        'center left', child=HPacker(children=parts, pad=0, sep=size), pad=0, frameon=False,
+        bbox_to_anchor=(x, 0.905), bbox_transform=figure.transFigure, borderpad=0))

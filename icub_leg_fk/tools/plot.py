@@ -1,0 +1,148 @@
+"""`leg_fk plot`: a picture of the feet over time and of the legs in space."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from icub_leg_fk.errors import InputFileError, LegFKError
+from icub_leg_fk.tools.chain_arguments import add_kinematics_file, chosen_version
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from icub_leg_fk.kinematics import Catalog, Chain
+    from icub_leg_fk.tools.recording import ChainTrack
+
+HELP = 'a picture of the feet over time and of the legs in space, from a bag or a CSV file'
+EXAMPLES = """\
+INPUT is a rosbag2 bag (directory, .mcap or .db3) with JointState messages, read by the node's
+own rules, or a CSV file with a column `time` in seconds and one column per joint, in radians;
+other columns are ignored. Gaps and joints outside their documented ranges are marked.
+
+examples:
+  leg_fk plot walking.csv
+  leg_fk plot walking_bag -o feet.pdf --at 1.5,2.0,2.5
+  leg_fk plot walking.mcap --version v1 --foot-frame sole --joint-topic /icub/joint_states
+  leg_fk plot arm.csv -k my_robot.yaml --version v1 --chains arm"""
+
+DEFAULT_CHAINS = ('left_leg', 'right_leg')
+MAX_INSTANTS = 4
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument('input', metavar='INPUT', type=Path, help='bag or CSV file')
+    parser.add_argument('-o', '--output', metavar='FILE', type=Path,
+                        help='picture to write, .png, .svg or .pdf (default: the name of INPUT '
+                             'with .png, in this directory)')
+    parser.add_argument('--force', action='store_true', help='replace an existing picture')
+    parser.add_argument('--chains', metavar='CHAIN', nargs='+',
+                        help='chains to draw (default: left_leg right_leg)')
+    parser.add_argument('--version', metavar='VERSION',
+                        help='version of the chains (default: v2_5, if they have it)')
+    parser.add_argument('--foot-frame', metavar='{dh,sole}', default='dh',
+                        help="axes of the feet: the table's last frame (the default), or the sole "
+                             '(x forward, y left, z up)')
+    parser.add_argument('--at', metavar='T[,T...]', type=_times,
+                        help=f'up to {MAX_INSTANTS} times [s] at which to draw the legs (default: '
+                             'where one foot is highest above the other, or farthest ahead)')
+    parser.add_argument('--joint-topic', metavar='TOPIC',
+                        help="the bag's topic with joint states (default: /joint_states, or the "
+                             'only one there is)')
+    add_kinematics_file(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Draw the picture."""
+    from icub_leg_fk.kinematics import Catalog
+    from icub_leg_fk.tools.pictures import feet_figure
+    from icub_leg_fk.tools.pictures_style import check_output, save_picture
+
+    output = args.output or Path(f'{args.input.resolve().stem}.png')
+    check_output(output, args.force)
+    if not args.input.exists():
+        raise InputFileError(f'{args.input}: found nothing of that name, allowed: a bag or a CSV '
+                             'file')
+    catalog = Catalog.load(args.kinematics_file)
+    chains = chosen_chains(catalog, args.chains, args.version, args.foot_frame)
+    tracks = _tracks(args.input, chains, args.joint_topic)
+    instants = _checked(args.at, tracks) if args.at else telling_instants(tracks)
+    versions = dict.fromkeys(chain.version for chain in chains)
+    title = f'{args.input.resolve().name}   {", ".join(versions)}'
+    soled = [chain.name for chain in chains if 'sole' in catalog.entry(chain.name).tip_frames]
+    save_picture(lambda: feet_figure(tracks, instants, title, soled), output)
+    poses = ', '.join(f'{len(track.times)} poses of {track.chain.tip}' for track in tracks)
+    print(f'{output}: {poses}')
+    return 0
+
+
+def chosen_chains(catalog: Catalog, names: Sequence[str] | None, version: str | None,
+                  foot_frame: str) -> list[Chain]:
+    """Return the chains asked for, or both legs, or else all that the catalog has.
+
+    Raises:
+        UnknownNameError: no such chain, version or tip frame; lists the known ones.
+    """
+    if names is None:
+        names = [name for name in DEFAULT_CHAINS if name in catalog.chains] or [*catalog.chains]
+    return [catalog.chain(name, chosen_version(catalog, name, version), foot_frame)
+            for name in dict.fromkeys(names)]
+
+
+def telling_instants(tracks: Sequence[ChainTrack]) -> list[float]:
+    """Return up to four times [s] worth drawing.
+
+    Of two feet those where one is highest above the other and farthest ahead of it, both ways;
+    else, and if the feet hardly move, evenly spaced ones.
+    """
+    import numpy as np
+
+    start = min(float(track.times.min()) for track in tracks)
+    end = max(float(track.times.max()) for track in tracks)
+    if len(tracks) == 2 and all((np.diff(track.times) >= 0).all() for track in tracks):
+        one, two = tracks
+        apart = one.poses[:, :3] - np.stack(
+            [np.interp(one.times, two.times, two.poses[:, i]) for i in range(3)], axis=1)
+        rows = {int(pick(apart[:, i])) for i in (2, 0) for pick in (np.argmax, np.argmin)}
+        instants = sorted(float(one.times[row]) for row in rows)
+        if len(instants) == MAX_INSTANTS:
+            return instants
+    return [start + (end - start) * share for share in (0.0, 1 / 3, 2 / 3, 1.0)] \
+        if end > start else [start]
+
+
+def _tracks(path: Path, chains: Sequence[Chain], topic: str | None) -> list[ChainTrack]:
+    from icub_leg_fk.tools.plot_bag import read_bag
+    from icub_leg_fk.tools.recording import read_csv
+
+    if path.suffix.lower() != '.csv':
+        return read_bag(path, chains, topic)
+    if topic is not None:
+        raise LegFKError(f'--joint-topic: {path} is a CSV file, which has no topics')
+    joints = dict.fromkeys(name for chain in chains for name in chain.joint_names)
+    recording = read_csv(path, joints)
+    return [recording.track(chain) for chain in chains]
+
+
+def _checked(instants: list[float], tracks: Sequence[ChainTrack]) -> list[float]:
+    start = min(float(track.times.min()) for track in tracks)
+    end = max(float(track.times.max()) for track in tracks)
+    for instant in instants:
+        if not start <= instant <= end:
+            raise LegFKError(f'--at: found {instant:g} s, allowed: {start:g} to {end:g} s')
+    return sorted(instants)
+
+
+def _times(text: str) -> list[float]:
+    try:
+        times = [float(word) for word in text.split(',')]
+    except ValueError:
+        times = []
+    if not 0 < len(times) <= MAX_INSTANTS or not all(map(math.isfinite, times)):
+        raise argparse.ArgumentTypeError(
+            f'found {text.strip()!r}, allowed: up to {MAX_INSTANTS} times in seconds, '
+            'separated by commas')
+    return times

@@ -1,0 +1,333 @@
+"""`leg_fk plot`: pictures from CSV files and bags, what they show, and what is refused."""
+
+from pathlib import Path
+import subprocess
+import sys
+import zlib
+
+import numpy as np
+import pytest
+
+pytest.importorskip('matplotlib')
+
+from icub_leg_fk.kinematics import Catalog  # noqa: E402
+from icub_leg_fk.tools.gait import walk  # noqa: E402
+from icub_leg_fk.tools.leg_fk import main  # noqa: E402
+from icub_leg_fk.tools.pictures import feet_figure  # noqa: E402
+from icub_leg_fk.tools.pictures_time import gaps, violations  # noqa: E402
+from icub_leg_fk.tools.plot import chosen_chains, telling_instants  # noqa: E402
+from icub_leg_fk.tools.recording import ChainTrack  # noqa: E402
+
+JOINTS = [f'{side}_{joint}' for side in 'lr' for joint in (
+    'hip_pitch', 'hip_roll', 'hip_yaw', 'knee', 'ankle_pitch', 'ankle_roll')]
+
+
+@pytest.fixture(scope='module')
+def gait():
+    return walk(Catalog.load(), 'v2_5', seconds=2.0)
+
+
+@pytest.fixture
+def walking_csv(tmp_path, monkeypatch, gait):
+    """A CSV file with extra columns and its columns in another order, in the present directory."""
+    monkeypatch.chdir(tmp_path)
+    rows = [f'{q[6]},{t:.3f},text,' + ','.join(map(repr, np.delete(q, 6).tolist()))
+            for t, q in zip(gait.times, gait.positions, strict=True)]
+    header = ','.join([JOINTS[6], 'time', 'note', *JOINTS[:6], *JOINTS[7:]])
+    file = tmp_path / 'walking.csv'
+    file.write_text('\n'.join([header, *rows]) + '\n')
+    return file
+
+
+@pytest.fixture
+def tracks(gait):
+    return [gait.track(chain) for chain in chosen_chains(Catalog.load(), None, None, 'dh')]
+
+
+def write_bag(path, messages, topic='/joint_states', storage='mcap', compression=None):
+    """Write messages (stamp [s], names, positions) as rosbags, not this project, writes them."""
+    rosbag2 = pytest.importorskip('rosbags.rosbag2')
+    typesys = pytest.importorskip('rosbags.typesys')
+    store = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
+    joint_state, header, time = (store.types[f'{name}'] for name in (
+        'sensor_msgs/msg/JointState', 'std_msgs/msg/Header', 'builtin_interfaces/msg/Time'))
+    plugin = rosbag2.StoragePlugin[storage.upper()]
+    writer = rosbag2.Writer(path, version=9, storage_plugin=plugin)
+    if compression:
+        writer.set_compression(rosbag2.CompressionMode[compression],
+                               rosbag2.CompressionFormat.ZSTD)
+    with writer:
+        connection = writer.add_connection(topic, joint_state.__msgtype__, typestore=store)
+        for stamp, names, positions in messages:
+            nanoseconds = round(stamp * 1e9)
+            message = joint_state(
+                header(time(*divmod(nanoseconds, 10**9)), ''), list(names),
+                np.array(positions, dtype=float), np.zeros(0), np.zeros(0))
+            writer.write(connection, nanoseconds,
+                         store.serialize_cdr(message, joint_state.__msgtype__))
+    return path
+
+
+def colors_in(png):
+    """Return the distinct colours (r, g, b) of a PNG that matplotlib wrote."""
+    image = (pytest.importorskip('matplotlib.image').imread(png) * 255).round().astype(int)
+    packed = np.unique(image[..., 0] << 16 | image[..., 1] << 8 | image[..., 2])
+    return {(c >> 16, c >> 8 & 255, c & 255) for c in packed.tolist()}
+
+
+@pytest.mark.parametrize(('name', 'start'), [
+    ('feet.png', b'\x89PNG'), ('feet.svg', b'<?xml'), ('feet.pdf', b'%PDF')])
+def test_draws_every_format(walking_csv, name, start):
+    assert main(['plot', 'walking.csv', '-o', name]) == 0
+    assert Path(name).read_bytes().startswith(start)
+    assert [path.name for path in Path().iterdir() if path.name not in (name, 'walking.csv')] == []
+
+
+def test_default_name_is_the_inputs_in_the_present_directory(walking_csv, tmp_path, monkeypatch):
+    (tmp_path / 'elsewhere').mkdir()
+    monkeypatch.chdir(tmp_path / 'elsewhere')
+    assert main(['plot', '../walking.csv']) == 0
+    assert Path('walking.png').is_file()
+
+
+def test_picture_has_the_documented_colors_of_axes_and_feet(walking_csv):
+    assert main(['plot', 'walking.csv']) == 0
+    documented = {(0xd6, 0x27, 0x28), (0x2c, 0xa0, 0x2c), (0x1f, 0x5f, 0xd0)}
+    feet = {(0x6a, 0x3d, 0x9a), (0xe0, 0x82, 0x14)}
+    assert documented | feet <= colors_in('walking.png')
+
+
+def test_same_input_gives_the_same_file(walking_csv):
+    for name in ('one.svg', 'two.svg', 'one.pdf', 'two.pdf'):
+        assert main(['plot', 'walking.csv', '-o', name]) == 0
+    for ending in ('svg', 'pdf'):
+        one, two = (Path(f'{name}.{ending}').read_bytes() for name in ('one', 'two'))
+        assert zlib.crc32(one) == zlib.crc32(two), ending
+
+
+def test_curves_are_the_poses_of_the_chains(tracks):
+    figure = feet_figure(tracks, [0.5, 1.0], 'walk', ['left_leg', 'right_leg'])
+    height, forward, left = figure.axes[:3]
+    for track, (z, x, y) in zip(tracks, zip(height.lines, forward.lines, left.lines)):
+        T = np.array([track.chain.forward(q) for q in track.positions])
+        assert np.allclose(z.get_ydata(), T[:, 2, 3])
+        assert np.allclose(x.get_ydata(), -T[:, 0, 3])  # root_link's x is backward
+        assert np.allclose(y.get_ydata(), -T[:, 1, 3])  # and its y is to the right
+        assert np.array_equal(z.get_xdata(), track.times)
+
+
+def test_range_violations_are_found_with_joint_limit_and_time(tracks):
+    q = tracks[1].positions.copy()
+    q[50:60, 3] = np.radians(1)  # knee -125 .. 0
+    q[70, 4] = np.radians(-43)  # ankle pitch -42 .. 21
+    found = violations(ChainTrack(tracks[1].chain, tracks[1].times, q))
+    assert [(v.joint, v.limit) for v in found] == [
+        ('r_knee', '> 0°'), ('r_ankle_pitch', '< \N{MINUS SIGN}42°')]
+    assert np.allclose(found[0].spans, [(0.5, 0.6)])
+    assert np.allclose(found[1].spans, [(0.7, 0.71)])
+    assert violations(tracks[1]) == []
+
+
+def test_gaps_break_the_curve(tracks):
+    keep = np.r_[0:80, 120:200]
+    cut = [ChainTrack(t.chain, t.times[keep], t.positions[keep]) for t in tracks]
+    assert np.allclose(gaps(cut[0]), [(0.79, 1.2)])
+    assert gaps(tracks[0]) == []
+    curve = feet_figure(cut, [0.5], 'walk', []).axes[0].lines[0]
+    assert np.isnan(curve.get_ydata()).sum() == 1
+    assert np.isnan(curve.get_ydata()[80])
+
+
+def test_long_curves_are_thinned_without_losing_their_extremes(tracks):
+    chain = tracks[0].chain
+    q = np.tile(tracks[0].positions, (500, 1))
+    q[12_345, 3] = -2.0
+    long = ChainTrack(chain, np.arange(len(q)) / 1000, q)
+    curve = feet_figure([long], [1.0], 'walk', []).axes[0].lines[0]
+    assert len(curve.get_ydata()) < 7000
+    assert curve.get_ydata().max() == long.poses[:, 2].max() == long.poses[12_345, 2]
+    assert curve.get_ydata().min() == long.poses[:, 2].min()
+
+
+def test_default_instants_show_each_foot_lifted_and_ahead(tracks):
+    left, right = (track.poses for track in tracks)
+    rows = [int(round(instant * 100)) for instant in telling_instants(tracks)]
+    apart = (left - right)[rows]
+    assert len(rows) == 4
+    assert apart[:, 2].max() > 0.04
+    assert apart[:, 2].min() < -0.04
+    assert apart[:, 0].max() > 0.1
+    assert apart[:, 0].min() < -0.1
+
+
+@pytest.mark.parametrize(('storage', 'compression'), [
+    ('mcap', None), ('sqlite3', 'FILE'), ('mcap', 'MESSAGE')])
+def test_bags_give_the_same_picture_as_csv(walking_csv, tmp_path, gait, storage, compression):
+    messages = [(1e9 + t, gait.joint_names, q)
+                for t, q in zip(gait.times, gait.positions, strict=True)]
+    bag = tmp_path / 'walking.bag2'
+    write_bag(bag, messages, storage=storage, compression=compression)
+    assert main(['plot', str(bag), '-o', 'bag.svg', '--at', '0.5,1']) == 0
+    assert main(['plot', 'walking.csv', '-o', 'csv.svg', '--at', '0.5,1']) == 0
+    bag_svg, csv_svg = (Path(name).read_text() for name in ('bag.svg', 'csv.svg'))
+    assert bag_svg.count('<path') == csv_svg.count('<path') > 100
+
+
+def test_bag_is_read_by_the_nodes_rules(tmp_path, monkeypatch, gait, capsys):
+    """One publisher per leg, reordered; short, repeated and NaN ones give no pose."""
+    monkeypatch.chdir(tmp_path)
+    messages = []
+    for t, q in zip(gait.times, gait.positions, strict=True):
+        messages.append((t + 1.0, gait.joint_names[:6][::-1], q[:6][::-1]))
+        messages.append((t + 1.002, (*gait.joint_names[6:], 'neck'), [*q[6:], 0.0]))
+    q = gait.positions[0]
+    messages += [(3.1, gait.joint_names, q[:5]), (3.2, ('l_knee', 'l_knee'), q[:2]),
+                 (3.3, gait.joint_names, [np.nan, *q[1:]])]
+    write_bag(tmp_path / 'bag', messages, topic='/legs')
+    assert main(['plot', 'bag']) == 0
+    assert f'{len(gait.times)} poses of left_foot' in (out := capsys.readouterr().out)
+    assert f'{len(gait.times) + 1} poses of right_foot' in out
+
+
+def test_bag_with_one_leg_draws_that_and_says_so(tmp_path, monkeypatch, gait, capsys):
+    monkeypatch.chdir(tmp_path)
+    write_bag(tmp_path / 'bag', [(t + 1, gait.joint_names[:6], q[:6]) for t, q in zip(
+        gait.times, gait.positions, strict=True)])
+    assert main(['plot', 'bag']) == 0
+    captured = capsys.readouterr()
+    assert 'left_foot' in captured.out
+    assert 'right_foot' not in captured.out
+    assert 'r_hip_pitch' in captured.err
+    assert captured.err.count('\n') == 1
+
+
+def test_any_chain_of_any_file_can_be_drawn(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    joints = Catalog.load().entry('head_imu').joint_names
+    Path('head.csv').write_text('\n'.join(
+        [','.join(['time', *joints]), *(f'{t},0.1,0,{t / 10},0,0.2,0' for t in range(9))]))
+    assert main(['plot', 'head.csv', '--chains', 'head_imu', '--version', 'v2']) == 0
+    assert Path('head.png').stat().st_size > 10_000
+
+
+def test_one_row_is_enough(walking_csv):
+    lines = walking_csv.read_text().splitlines()
+    Path('one.csv').write_text('\n'.join(lines[:2]))
+    assert main(['plot', 'one.csv']) == 0
+
+
+def test_existing_picture_is_replaced_only_when_forced(walking_csv, capsys):
+    Path('walking.png').write_text('mine')
+    assert main(['plot', 'walking.csv']) == 2
+    assert Path('walking.png').read_text() == 'mine'
+    assert '--force' in capsys.readouterr().err
+    assert main(['plot', 'walking.csv', '--force']) == 0
+    assert Path('walking.png').read_bytes().startswith(b'\x89PNG')
+
+
+def test_failed_picture_leaves_nothing_behind(walking_csv, monkeypatch):
+    from matplotlib.figure import Figure
+
+    def fail(*args, **kwargs):
+        raise OSError(28, 'No space left on device')
+    monkeypatch.setattr(Figure, 'savefig', fail)
+    assert main(['plot', 'walking.csv']) == 2
+    assert [path.name for path in Path().iterdir()] == ['walking.csv']
+
+
+@pytest.mark.parametrize(('words', 'named'), [
+    (['nowhere.csv'], ['nowhere.csv']),
+    (['walking.csv', '-o', 'feet.bmp'], ['.bmp', '.png, .svg, .pdf']),
+    (['walking.csv', '-o', 'none/feet.png'], ['none/feet.png', 'directory']),
+    (['walking.csv', '--version', 'v9'], ['v9', 'v2_5']),
+    (['walking.csv', '--foot-frame', 'toe'], ['toe', 'sole']),
+    (['walking.csv', '--chains', 'arm'], ['arm', 'left_leg']),
+    (['walking.csv', '--at', '1,x'], ['1,x']),
+    (['walking.csv', '--at', '1,2,3,4,5'], ['1,2,3,4,5', '4']),
+    (['walking.csv', '--at', '7'], ['7 s', '0 to 1.99 s']),
+    (['walking.csv', '--joint-topic', '/legs'], ['--joint-topic', 'CSV']),
+    (['walking.csv', '-k', 'no.yaml'], ['no.yaml']),
+    (['empty.csv'], ['empty.csv:1', 'header']),
+    (['header.csv'], ['header.csv', 'rows']),
+    (['missing.csv'], ['missing.csv:1', 'column l_knee']),
+    (['untimed.csv'], ['untimed.csv:1', 'column time']),
+    (['twice.csv'], ['twice.csv:1', 'column r_knee', 'twice']),
+    (['text.csv'], ['text.csv:4', 'column r_hip_roll', "'soon'"]),
+    (['nan.csv'], ['nan.csv:5', 'column time', "'nan'"]),
+    (['short.csv'], ['short.csv:6', 'column r_ankle_pitch', '12 values']),
+    (['unsorted.csv'], ['unsorted.csv:8', 'column time', '0.05 after 0.06']),
+    (['binary.csv'], ['binary.csv', 'CSV']),
+    (['broken.mcap'], ['broken.mcap', 'bag']),
+    (['emptydir'], ['emptydir', 'bag']),
+])
+def test_bad_input_is_one_line_and_exit_2(walking_csv, capsys, words, named):
+    spoil(walking_csv)
+    assert main(['plot', *words]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ''
+    assert captured.err.count('\n') == 1
+    for word in named:
+        assert word in captured.err
+    assert not list(Path().glob('*.png'))
+
+
+def spoil(good):
+    """Write one bad file of each kind beside a good CSV file."""
+    lines = good.read_text().splitlines()
+    header = lines[0].split(',')
+
+    def without(name):
+        index = header.index(name)
+        return [','.join(w for i, w in enumerate(line.split(',')) if i != index)
+                for line in lines]
+
+    def edited(line, column, text):
+        words = lines[line - 1].split(',')
+        words[header.index(column)] = text
+        return [*lines[:line - 1], ','.join(words), *lines[line:]]
+
+    at_r_knee = header.index('r_knee')
+    files = {
+        'empty': [], 'header': lines[:1], 'missing': without('l_knee'), 'untimed': without('time'),
+        'twice': [f'{line},{line.split(",")[at_r_knee]}' for line in lines],
+        'text': edited(4, 'r_hip_roll', 'soon'), 'nan': edited(5, 'time', 'nan'),
+        'short': [*lines[:5], ','.join(lines[5].split(',')[:12]), *lines[6:]],
+        'unsorted': [*lines[:6], lines[7], lines[6], *lines[8:]],
+    }
+    for name, content in files.items():
+        good.with_name(f'{name}.csv').write_text('\n'.join(content))
+    good.with_name('binary.csv').write_bytes(b'\xff\xfe\x00\x01' * 100)
+    good.with_name('broken.mcap').write_bytes(b'\x89MCAP0\r\n' + b'nothing' * 9)
+    good.with_name('emptydir').mkdir()
+
+
+def test_damaged_bag_gives_what_can_be_read(tmp_path, monkeypatch, gait, capsys):
+    monkeypatch.chdir(tmp_path)
+    bag = write_bag(tmp_path / 'bag', [(t + 1, gait.joint_names, q) for t, q in zip(
+        np.arange(2000) / 100, np.tile(gait.positions, (10, 1)), strict=True)], storage='sqlite3')
+    file, = bag.glob('*.db3')
+    data = bytearray(file.read_bytes())
+    data[len(data) // 2:] = bytes(len(data) - len(data) // 2)
+    file.write_bytes(data)
+    status = main(['plot', 'bag'])
+    captured = capsys.readouterr()
+    assert captured.err.count('\n') == 1
+    assert status == 2 or 'damaged after' in captured.err
+
+
+def test_bag_without_joint_states_lists_what_it_has(tmp_path, monkeypatch, gait, capsys):
+    monkeypatch.chdir(tmp_path)
+    write_bag(tmp_path / 'bag', [(1.0, gait.joint_names, gait.positions[0])], topic='/legs')
+    assert main(['plot', 'bag', '--joint-topic', '/joint_states']) == 2
+    assert '/legs' in capsys.readouterr().err
+
+
+def test_missing_matplotlib_is_one_line(walking_csv):
+    code = ("import sys; sys.modules['matplotlib'] = None\n"
+            'from icub_leg_fk.tools.leg_fk import main\n'
+            "sys.exit(main(['plot', 'walking.csv']))")
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
+                          check=False)
+    assert done.returncode == 2
+    assert done.stderr.count('\n') == 1
+    assert 'matplotlib' in done.stderr
