@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 import sys
 import sysconfig
@@ -83,7 +82,7 @@ def config_file(name: str) -> Path:
     Raises:
         CatalogError: it is in none of these places; lists them.
     """
-    package = Path(str(resources.files(PACKAGE)))
+    package = Path(__file__).parents[1]
     prefixes = [*package.parents, Path(sys.prefix), Path(sysconfig.get_path('data'))]
     shares = [prefix / 'share' / PACKAGE / 'config' for prefix in prefixes]
     places = [package.parent / 'config', *dict.fromkeys(shares)]

@@ -9,11 +9,13 @@ from pathlib import Path
 
 from icub_leg_fk.kinematics.link import DHLink, JOINT_TYPES
 from icub_leg_fk.kinematics.rotation import Array, is_rigid_transform
-from icub_leg_fk.kinematics.yaml_fields import Field, read_yaml
+from icub_leg_fk.kinematics.yaml_fields import Field, read_yaml, WORD
 import numpy as np
 
-_LENGTHS = {'mm': 1e-3, 'm': 1.0}
-_ANGLES = {'deg': math.pi / 180, 'rad': 1.0}
+_LENGTHS = ('mm', 'm')
+_ANGLES = ('deg', 'rad')
+_CHAIN = ('tip', 'root_frame', 'joints', 'tip_frames', 'versions')
+_DH = ('a', 'd', 'alpha', 'offset')
 
 
 @dataclass(frozen=True)
@@ -62,9 +64,10 @@ class _Units:
         return math.radians(value) if self.angle == 'deg' else value
 
     def transform(self, field: Field) -> Array:
-        rows = field.items('4 rows of 4 numbers', 4)
-        T = np.array([[number.number() for number in row.items('a row of 4 numbers', 4)]
-                      for row in rows])
+        T = np.array([
+            [number.at(f'column {j}').number() for j, number in enumerate(
+                row.at(f'row {i}').items('a row of 4 numbers', 4))]
+            for i, row in enumerate(field.items('4 rows of 4 numbers', 4))])
         if self.length == 'mm':
             T[:3, 3] /= 1000.0
         if not is_rigid_transform(T):
@@ -80,41 +83,37 @@ def read_catalog_file(path: str | Path) -> dict[str, ChainEntry]:
     """
     top = read_yaml(path).record(('units', 'chains'))
     unit_fields = top['units'].record(('length', 'angle'))
-    units = _Units(unit_fields['length'].choice(tuple(_LENGTHS)),
-                   unit_fields['angle'].choice(tuple(_ANGLES)))
-    chains = top['chains'].mapping('chains by name', lambda name: f'chain {name}')
+    units = _Units(unit_fields['length'].choice(_LENGTHS), unit_fields['angle'].choice(_ANGLES))
+    chains = top['chains'].mapping('chains by name', lambda name: f'chain {name}', WORD)
     if not chains:
         top['chains'].fail('at least one chain', 'none')
     entries = {name: _chain(name, field, units) for name, field in chains.items()}
-    _refuse_shared_tips(entries, chains)
-    return entries
-
-
-def _refuse_shared_tips(entries: dict[str, ChainEntry], fields: dict[str, Field]) -> None:
     owners: dict[str, str] = {}
     for name, entry in entries.items():
         owner = owners.setdefault(entry.tip, name)
         if owner != name:
-            fields[name].fail('a tip of its own', f'tip {entry.tip} of chain {owner}')
+            tip = chains[name].record(_CHAIN)['tip']
+            tip.fail('a tip of its own', f'{entry.tip}, the tip of chain {owner}')
+    return entries
 
 
 def _chain(name: str, field: Field, units: _Units) -> ChainEntry:
-    if not name.replace('_', 'a').isalnum() or name[0].isdigit():
-        field.fail('a chain name of letters, digits and _', repr(name))
-    fields = field.record(('tip', 'root_frame', 'joints', 'tip_frames', 'versions'))
-    joints = tuple(item.name('a joint name') for item in fields['joints'].items('joint names'))
-    for joint in joints:
-        if joints.count(joint) > 1:
-            fields['joints'].fail('each joint once', f'{joint!r} twice')
+    fields = field.record(_CHAIN)
+    joints: list[str] = []
+    for item in fields['joints'].items('a list of joint names'):
+        joint = item.name('a joint name')
+        if joint in joints:
+            item.fail('each joint once', f'joint {joint} twice')
+        joints.append(joint)
     versions = fields['versions'].mapping(
         'versions by name', lambda version: f'chain {name}, version {version}')
     if not versions:
         fields['versions'].fail('at least one version', 'none')
     return ChainEntry(
         name=name,
-        tip=fields['tip'].name('a name', r'[A-Za-z][A-Za-z0-9_]*'),
+        tip=fields['tip'].name('a name', WORD),
         root_frame=fields['root_frame'].name('a frame id'),
-        joint_names=joints,
+        joint_names=tuple(joints),
         tip_frames=_tip_frames(fields['tip_frames'], units),
         versions={version: _version(at, len(joints), units) for version, at in versions.items()},
     )
@@ -133,10 +132,8 @@ def _tip_frames(field: Field, units: _Units) -> dict[str, TipFrame]:
 def _version(field: Field, n_joints: int, units: _Units) -> ChainVersion:
     fields = field.record(('T_Ro0', 'links'), ('virtual_link', 'T_nIs', 'source'))
     kind = f'{n_joints} rows, one per joint'
-    rows = [
-        Field(row.file, f'{field.where}, row {i}', row.node)
-        for i, row in enumerate(fields['links'].items(kind, n_joints))
-    ]
+    rows = [Field(field.file, f'{field.where}, row {i}', row.node)
+            for i, row in enumerate(fields['links'].items(kind, n_joints))]
     virtual = fields.get('virtual_link')
     return ChainVersion(
         T_root_0=units.transform(fields['T_Ro0']),
@@ -148,14 +145,16 @@ def _version(field: Field, n_joints: int, units: _Units) -> ChainVersion:
 
 
 def _link(row: Field, units: _Units) -> DHLink:
-    fields = row.record(('a', 'd', 'alpha', 'offset'), ('range', 'type', 'erratum'))
+    fields = row.record(_DH, ('range', 'type', 'erratum'))
     joint_type = fields['type'].choice(JOINT_TYPES) if 'type' in fields else 'revolute'
     lower, upper = -math.inf, math.inf
     if 'range' in fields:
         convert = units.metres if joint_type == 'prismatic' else units.radians
-        lower, upper = map(convert, fields['range'].items('[lower, upper]', 2))
+        limits = list(fields['range'].items('[lower, upper]', 2))
+        lower, upper = map(convert, limits)
         if lower > upper:
-            fields['range'].fail('lower <= upper', 'lower > upper')
+            found = ' above '.join(limit.found() for limit in limits)
+            fields['range'].fail('lower at most upper', found)
     return DHLink(
         a=units.metres(fields['a']), d=units.metres(fields['d']),
         alpha=units.radians(fields['alpha']), offset=units.radians(fields['offset']),
@@ -164,6 +163,6 @@ def _link(row: Field, units: _Units) -> DHLink:
 
 
 def _virtual_link(row: Field, units: _Units) -> DHLink:
-    fields = row.record(('a', 'd', 'alpha', 'offset'))
+    fields = row.record(_DH)
     return DHLink(a=units.metres(fields['a']), d=units.metres(fields['d']),
                   alpha=units.radians(fields['alpha']), offset=units.radians(fields['offset']))

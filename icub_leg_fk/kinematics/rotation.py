@@ -97,6 +97,7 @@ def is_rigid_transform(T: Array, tolerance: float = 1e-6) -> bool:
     return bool(
         np.all(np.isfinite(T))
         and np.array_equal(T[3], (0, 0, 0, 1))
+        and np.all(np.abs(R) < 2)  # larger ones may overflow below
         and np.allclose(R @ R.T, np.eye(3), atol=tolerance)
         and np.linalg.det(R) > 0
     )

@@ -1,46 +1,28 @@
-"""Reading a YAML file node by node, so that every complaint can name its line.
-
-`yaml.safe_load` would forget the lines, keep only the last of two equal keys, expand aliases
-and read `1:30` as 90. Here a file is composed with the safe loader into nodes, bounded in size
-and depth and without aliases, and read through `Field`, which knows where it stands.
-"""
+"""Reading the nodes of a YAML file one by one, so that every complaint can name its place."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+import math
 from pathlib import Path
 import re
-from typing import Any, NoReturn
+import reprlib
+from typing import NoReturn
 
 from icub_leg_fk.errors import CatalogError
+from icub_leg_fk.kinematics.yaml_file import read_nodes
 import yaml
 
-MAX_BYTES = 1_000_000
-MAX_DEPTH = 16
+_NUMBER = re.compile(r'[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]{1,3})?')
+NAME = re.compile(r'[A-Za-z0-9_./-]{1,100}')
+WORD = re.compile(r'[A-Za-z][A-Za-z0-9_]{0,63}')  # also a part of topic and parameter names
+_NAMED = {NAME: 'up to 100 letters, digits and _ . / -',
+          WORD: 'a letter, then up to 63 letters, digits and _'}
+_LINE = re.compile(r'.{0,300}')
 
-_NUMBER = re.compile(r'[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d{1,3})?')
-
-
-class _Loader(yaml.SafeLoader):
-    """The safe loader's composer, bounded in depth and without aliases."""
-
-    depth = 0
-
-    def compose_node(self, parent: Any, index: Any) -> Any:
-        event = self.peek_event()
-        if isinstance(event, yaml.AliasEvent):
-            raise yaml.composer.ComposerError(
-                None, None, f'found alias *{event.anchor}, allowed: plain values',
-                event.start_mark)
-        self.depth += 1
-        if self.depth > MAX_DEPTH:
-            raise yaml.composer.ComposerError(
-                None, None, f'found more than {MAX_DEPTH} nested levels, allowed: '
-                f'{MAX_DEPTH}', event.start_mark)
-        node = super().compose_node(parent, index)
-        self.depth -= 1
-        return node
+_short = reprlib.Repr()
+_short.maxstring = 60
 
 
 @dataclass(frozen=True)
@@ -63,25 +45,31 @@ class Field:
     def found(self) -> str:
         """Return what stands here, short enough for one line."""
         if isinstance(self.node, yaml.ScalarNode):
-            text = repr(self.node.value)
-            return text if len(text) <= 60 else text[:57] + '...'
+            if self._is_quoted():
+                return f'the text {_short.repr(self.node.value)}'
+            return _short.repr(self.node.value) if self.node.value else 'nothing'
         return 'a list' if isinstance(self.node, yaml.SequenceNode) else 'a mapping'
 
-    def mapping(self, kind: str, where: Callable[[str], str]) -> dict[str, Field]:
+    def at(self, place: str) -> Field:
+        """Return the same node, with its place described more closely."""
+        return Field(self.file, f'{self.where}, {place}', self.node)
+
+    def mapping(self, kind: str, where: Callable[[str], str],
+                pattern: re.Pattern[str] = NAME) -> dict[str, Field]:
         """Return the values of a mapping by name, refusing a key that stands twice.
 
         Args:
             kind: what the mapping holds, for the error.
             where: how to call the place of a value, given its key.
+            pattern: what a key looks like.
         """
         if not isinstance(self.node, yaml.MappingNode):
             self.fail(kind)
         fields: dict[str, Field] = {}
         for key, value in self.node.value:
-            at = Field(self.file, self.where, key)
-            name = at.name('a name')
+            name = Field(self.file, self.where, key).name('a name', pattern)
             if name in fields:
-                at.fail('each key once', f'key {name!r} twice')
+                Field(self.file, where(name), key).fail('each key once', 'the key again')
             fields[name] = Field(self.file, where(name), value)
         return fields
 
@@ -92,83 +80,65 @@ class Field:
         fields = self.mapping(f'a mapping with {known}', lambda key: f'{self.where}, field {key}')
         for key, _ in self.node.value:
             if key.value not in required + optional:
-                Field(self.file, self.where, key).fail(known, f'key {key.value!r}')
+                Field(self.file, self.where, key).fail(known, f'key {_short.repr(key.value)}')
         for name in required:
             if name not in fields:
-                self.fail(f'all of {", ".join(required)}', f'no {name}')
+                self.at(f'field {name}').fail(f'all of {", ".join(required)}', 'nothing')
         return fields
 
     def items(self, kind: str, length: int | None = None) -> Iterator[Field]:
         """Yield the items of a list."""
         if not isinstance(self.node, yaml.SequenceNode):
             self.fail(kind)
-        if length is not None and len(self.node.value) != length:
-            self.fail(kind, f'{len(self.node.value)} values')
-        if not self.node.value:
-            self.fail(kind, 'an empty list')
+        count = len(self.node.value)
+        if count != (count if length is None else length) or not count:
+            self.fail(kind, f'{count} item{"s" * (count != 1)}')
         for item in self.node.value:
             yield Field(self.file, self.where, item)
 
     def number(self, unit: str = '') -> float:
         """Return a finite number."""
-        allowed = f'a finite number{unit and f" ({unit})"}'
-        node = self.node
-        if not isinstance(node, yaml.ScalarNode) or node.style or not _NUMBER.fullmatch(node.value):
-            self.fail(allowed)
-        value = float(node.value)
-        if abs(value) == float('inf'):
-            self.fail(allowed)
-        return value
+        text = self._scalar(_NUMBER)
+        if text is None or self._is_quoted() or math.isinf(float(text)):
+            self.fail(f'a finite number ({unit})' if unit else 'a finite number')
+        return float(text)
 
-    def name(self, kind: str, pattern: str = r'[A-Za-z0-9_./-]+') -> str:
+    def name(self, kind: str, pattern: re.Pattern[str] = NAME) -> str:
         """Return a word."""
-        if not isinstance(self.node, yaml.ScalarNode) or not re.fullmatch(pattern, self.node.value):
-            self.fail(f'{kind} of letters, digits and _')
-        return str(self.node.value)
+        text = self._scalar(pattern)
+        if text is None:
+            self.fail(f'{kind}: {_NAMED[pattern]}')
+        return text
 
     def text(self) -> str:
         """Return free text of one line."""
-        if not isinstance(self.node, yaml.ScalarNode) or not str(self.node.value).isprintable():
+        text = self._scalar(_LINE)
+        if text is None or not text.isprintable():
             self.fail('text of one line')
-        return str(self.node.value)
+        return text
 
     def choice(self, choices: tuple[str, ...]) -> str:
         """Return one of some words."""
-        if not isinstance(self.node, yaml.ScalarNode) or self.node.value not in choices:
+        text = self._scalar(_LINE)
+        if text not in choices:
             self.fail(' or '.join(choices))
-        return str(self.node.value)
+        return text
+
+    def _is_quoted(self) -> bool:
+        return isinstance(self.node, yaml.ScalarNode) and bool(self.node.style)
+
+    def _scalar(self, pattern: re.Pattern[str]) -> str | None:
+        """Return the text of a scalar that matches, or None."""
+        if isinstance(self.node, yaml.ScalarNode) and pattern.fullmatch(self.node.value):
+            return str(self.node.value)
+        return None
 
 
 def read_yaml(path: str | Path) -> Field:
     """Return the root of a YAML file.
 
     Raises:
-        CatalogError: it cannot be read, is too large, nests too deep, holds an alias or more
-            than one document, or is no YAML.
+        CatalogError: the file cannot be read or is no plain YAML.
     """
-    file = str(path)
-    try:
-        with open(path, 'rb') as stream:
-            data = stream.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise CatalogError(file, 0, 'kinematics file', error.strerror or str(error),
-                           'a readable YAML file') from error
-    if len(data) > MAX_BYTES:
-        raise CatalogError(file, 0, 'kinematics file', f'more than {MAX_BYTES} bytes',
-                           f'at most {MAX_BYTES} bytes')
-    loader = None
-    try:
-        loader = _Loader(data)
-        node = loader.get_single_node()
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        mark = getattr(error, 'problem_mark', None) or getattr(error, 'context_mark', None)
-        problem = getattr(error, 'problem', None) or getattr(error, 'reason', None) or 'no YAML'
-        found, _, allowed = ' '.join(str(problem).split()).partition(', allowed: ')
-        raise CatalogError(file, mark.line + 1 if mark else 0, 'kinematics file',
-                           found.removeprefix('found '), allowed or 'well-formed YAML') from error
-    finally:
-        if loader is not None:
-            loader.dispose()
-    if node is None:
-        raise CatalogError(file, 0, 'kinematics file', 'nothing', 'units and chains')
+    file, node = read_nodes(path)
     return Field(file, 'kinematics file', node)
