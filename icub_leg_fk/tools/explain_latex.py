@@ -29,16 +29,17 @@ PREAMBLE = r"""\documentclass[10pt]{article}
 \setcounter{MaxMatrixCols}{20}
 \begin{document}"""
 
-GENERAL = r"""\[ A_i = T_{i(i+1)} = R_z(\theta_i)\, t_z(d_i)\, t_x(a_i)\, R_x(\alpha_i) = \begin{bmatrix}
+GENERAL = r"""\[ A_i = T_{i(i+1)} = R_z(\theta_i)\, t_z(d_i)\, t_x(a_i)\, R_x(\alpha_i)
+= \begin{bmatrix}
 \cos\theta_i & -\sin\theta_i\cos\alpha_i & \sin\theta_i\sin\alpha_i & a_i\cos\theta_i \\
 \sin\theta_i & \cos\theta_i\cos\alpha_i & -\cos\theta_i\sin\alpha_i & a_i\sin\theta_i \\
 0 & \sin\alpha_i & \cos\alpha_i & d_i \\
 0 & 0 & 0 & 1
 \end{bmatrix} \]"""
 
-FRAMES = r"""Row $i$ of the table turns or slides about $z_i$. The origin $o_i$ is where $z_i$ meets
-$z_{i-1}$, or where their common normal ends; $x_i$ is orthogonal to both axes; $y_i = z_i \times
-x_i$."""
+FRAMES = r"""The joint of row $i$ turns about, or slides along, $z_i$. The origin $o_i$ is where
+$z_i$ meets $z_{i-1}$, or where their common normal ends; $x_i$ is orthogonal to both axes;
+$y_i = z_i \times x_i$."""
 
 
 def explanation_latex(e: Explanation) -> str:

@@ -209,7 +209,7 @@ def _frames(chain: Chain, q: Sequence[float] | None) -> Array:
 
 
 def pi_text(angle: float) -> str:
-    """Return an angle [rad] as the tables print it: -pi/2, pi, 0; decimals if it is no such part."""
+    """Return an angle [rad] as the tables print it: -pi/2, pi, 0; else in decimals."""
     part = Fraction(f'{math.degrees(angle):.12g}') / 180
     if part.denominator > 180:
         return f'{angle:.6g}'

@@ -107,8 +107,10 @@ class Exact:
         return sympy.Symbol(name)
 
     def _tidy(self, cell: Cell) -> Cell:
-        """Multiply numbers out; products of symbols stay factored, which is shorter."""
-        return sympy.expand(cell) if sympy.sympify(cell).is_number else cell
+        """Multiply numbers out where that shortens them; symbols stay factored."""
+        if not sympy.sympify(cell).is_number:
+            return cell
+        return min(sympy.expand(cell), cell, key=sympy.count_ops)
 
 
 def exact_mm(metres: float) -> Cell:

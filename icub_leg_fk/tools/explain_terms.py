@@ -31,7 +31,7 @@ def _latex_constant(number: Cell) -> str:
 
 
 def symbol_latex(name: str) -> str:
-    """Return `theta_0` as `\\theta_{0}`."""
+    """Return `theta_0` with a backslash before it, and its index in braces."""
     letter, _, index = name.partition('_')
     greek = rf'\{letter}' if len(letter) > 1 else letter
     return f'{greek}_{{{index.replace("_", chr(32))}}}'

@@ -55,7 +55,8 @@ def origin_reason(e: Explanation, i: int) -> str:
     link = e.steps[i - 1].row.link
     above, own, apart = f'z_{i - 1}', f'z_{i}', f'{short(1000 * abs(link.a))} mm'
     if abs(math.sin(link.alpha)) < 1e-12:
-        return f'{own} lies on {above}' if link.a == 0 else f'{own} parallel to {above}, {apart} away'
+        relation = f'parallel to {above}, {apart} away' if link.a else f'lies on {above}'
+        return f'{own} {relation}'
     if link.a == 0:
         return f'{above} and {own} meet here'
     return f'where the common normal from {above} ends, {apart} away'

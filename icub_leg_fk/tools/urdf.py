@@ -1,0 +1,85 @@
+"""`leg_fk urdf`: chains as a URDF."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from icub_leg_fk.errors import LegFKError
+from icub_leg_fk.tools.chain_arguments import add_kinematics_file, DEFAULT_VERSION
+
+if TYPE_CHECKING:
+    from icub_leg_fk.kinematics import Catalog
+    from icub_leg_fk.tools.urdf_model import Selection
+
+HELP = 'write chains as a URDF, for robot_state_publisher, RViz, Pinocchio'
+EXAMPLES = """\
+The URDF has the frames of the tables: both tip frames where a chain has two, joint names and
+printed ranges. Every chain hangs from the root frame, which the chains must share.
+
+examples:
+  leg_fk urdf -o legs.urdf
+  leg_fk urdf left_leg --version v1
+  leg_fk urdf left_leg right_leg head_imu --chain-version head_imu=v2 -o icub.urdf
+  leg_fk urdf -k my_robot.yaml --version v1 --name my_robot"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument('chains', metavar='CHAIN', nargs='*',
+                        help='chains to write (default: all that have the version asked for)')
+    parser.add_argument('--version', metavar='VERSION', default=DEFAULT_VERSION,
+                        help='version of every chain that has none of its own (default: v2_5)')
+    parser.add_argument('--chain-version', metavar='CHAIN=VERSION', action='append', default=[],
+                        type=_chain_version, help="one chain's own version; may be repeated")
+    parser.add_argument('--name', help='name of the robot (default: icub, or that of your file)')
+    parser.add_argument('-o', '--output', metavar='FILE',
+                        help='file to write, or to replace (default: standard output)')
+    add_kinematics_file(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the URDF."""
+    from icub_leg_fk.kinematics import Catalog
+    from icub_leg_fk.tools.urdf_model import urdf_text
+
+    catalog = Catalog.load(args.kinematics_file)
+    own_versions = dict(args.chain_version)
+    selections = _selections(catalog, args.chains, args.version, own_versions)
+    robot = args.name or ('icub' if args.kinematics_file is None else Path(catalog.file).stem)
+    text = urdf_text(robot, selections)
+    if args.output:
+        from icub_leg_fk.tools.output_file import write_text
+        write_text(args.output, text)
+    else:
+        print(text, end='')
+    return 0
+
+
+def _selections(catalog: Catalog, chains: list[str], version: str,
+                own_versions: dict[str, str]) -> list[Selection]:
+    from icub_leg_fk.tools.urdf_model import Selection
+
+    for name in [*chains, *own_versions]:
+        catalog.entry(name)
+    names = list(dict.fromkeys(chains)) or [
+        name for name, entry in catalog.chains.items()
+        if name in own_versions or version in entry.versions]
+    if not names:
+        raise LegFKError(f'no chain has version {version!r}: give --version or --chain-version')
+    for name in own_versions:
+        if name not in names:
+            raise LegFKError(f'--chain-version: found {name}, allowed: {", ".join(names)}')
+    selections = []
+    for name in names:
+        chain = catalog.chain(name, own_versions.get(name, version))
+        selections.append(Selection(catalog.entry(name), chain.version))
+    return selections
+
+
+def _chain_version(text: str) -> tuple[str, str]:
+    chain, separator, version = text.partition('=')
+    if not (chain and separator and version):
+        raise argparse.ArgumentTypeError(f'found {text!r}, allowed: CHAIN=VERSION')
+    return chain, version
