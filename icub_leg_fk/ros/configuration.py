@@ -53,8 +53,8 @@ class Configuration:
         """
         names = values['chains']
         if not names or len(set(names)) != len(names):
-            raise ParameterError(f'parameter chains: found {list(names or ())}, allowed: one or more of '
-                                 f'{", ".join(catalog.chains)}, each once')
+            raise ParameterError(f'parameter chains: found {list(names or ())}, allowed: one or '
+                                 f'more of {", ".join(catalog.chains)}, each once')
         _check_choice('foot_frame', values['foot_frame'], FOOT_FRAMES)
         _check_choice('stamp_source', values['stamp_source'], STAMP_SOURCES)
         timeout, prefix = values['joint_timeout'], values['frame_prefix']
@@ -67,6 +67,9 @@ class Configuration:
         if values['publish_tf'] and find_spec('tf2_ros') is None:
             raise ParameterError('parameter publish_tf: found true without the package tf2_ros, '
                                  'allowed: false, or install tf2_ros')
+        for name, entry in catalog.chains.items():
+            if own := values.get(version_parameter(name)):
+                _check_choice(version_parameter(name), own, tuple(entry.versions))
         chains = tuple(_chain(name, values, catalog) for name in names)
         return cls(
             chains=chains,
@@ -94,13 +97,12 @@ def _check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
 
 
 def _chain(name: str, values: Mapping[str, Any], catalog: Catalog) -> Chain:
-    parameter = 'chains'
+    parameter, own = 'chains', version_parameter(name)
     try:
         entry = catalog.entry(name)
-        own = version_parameter(name)
-        parameter = own if values.get(own) else 'version'
+        parameter = 'version'
         foot_frame = values['foot_frame'] if values['foot_frame'] in entry.tip_frames else 'dh'
-        return catalog.chain(name, values[parameter], foot_frame)
+        return catalog.chain(name, values.get(own) or values['version'], foot_frame)
     except LegFKError as error:
-        hint = '' if parameter != 'version' else f' (or set {version_parameter(name)})'
+        hint = f' (or set {own})' if parameter == 'version' else ''
         raise ParameterError(f'parameter {parameter}: {error}{hint}') from error

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from rclpy.exceptions import NameValidationException, ParameterException
-from rclpy.node import Node
-from rclpy.qos import qos_profile_sensor_data
-from rclpy.qos_overriding_options import QoSOverridingOptions
-from sensor_msgs.msg import JointState
-
 from icub_leg_fk.ros.configuration import Configuration
 from icub_leg_fk.ros.diagnostics import Diagnostics
 from icub_leg_fk.ros.joint_input import JointInput
 from icub_leg_fk.ros.joint_stream import JointStream
-from icub_leg_fk.ros.outputs import OVERRIDABLE, Outputs
+from icub_leg_fk.ros.outputs import Outputs
 from icub_leg_fk.ros.parameters import NodeParameters
+from icub_leg_fk.ros.qos_overrides import OVERRIDABLE
 from icub_leg_fk.ros.throttle import ThrottledWarnings
+from rclpy.exceptions import NameValidationException, ParameterException
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import JointState
 
 NODE_NAME = 'foot_pose_publisher'
 START_ERRORS = (ParameterException, NameValidationException, RuntimeError)
@@ -30,6 +29,7 @@ class FootPosePublisher(Node):
 
     def __init__(self) -> None:
         super().__init__(NODE_NAME)
+        parameters = NodeParameters(self, self._configure)
         self._warnings = ThrottledWarnings(lambda text: self.get_logger().warning(text))
         self._stream: JointStream | None = None
         self._outputs = Outputs(self, self._connect,
@@ -37,8 +37,7 @@ class FootPosePublisher(Node):
         self._diagnostics = Diagnostics(self)
         self.create_subscription(
             JointState, 'joint_states', self._on_joint_state, qos_profile_sensor_data, raw=True,
-            qos_overriding_options=QoSOverridingOptions(policy_kinds=OVERRIDABLE))
-        parameters = NodeParameters(self, self._configure)
+            qos_overriding_options=OVERRIDABLE)
         self._configure(parameters.configuration)
 
     def _configure(self, configuration: Configuration) -> None:

@@ -75,14 +75,15 @@ def _run(stop: _StopSignals, argv: list[str]) -> int:
         return _refuse(f'rclpy cannot be imported ({error}); source ROS 2, or install '
                        'icub_leg_fk[ros]')
     from icub_leg_fk.errors import LegFKError
-    from icub_leg_fk.ros.foot_pose_publisher import START_ERRORS, FootPosePublisher
+    from icub_leg_fk.ros.foot_pose_publisher import FootPosePublisher, START_ERRORS
     set_logger_level('rcl', LoggingSeverity.FATAL)  # what rcl would log comes as an exception
     try:
         rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
-        if unknown := remove_ros_args(argv)[1:]:
-            return _refuse(f'unknown argument {unknown[0]!r}; parameters go behind --ros-args')
-    except Exception as error:  # rclpy has no public class for arguments it cannot parse
-        return _refuse(str(error))
+        if others := remove_ros_args(argv)[1:]:
+            return _refuse(f'unknown argument {others[0]!r}; parameters go behind --ros-args')
+    except RuntimeError as error:  # rclpy's errors for arguments it cannot parse
+        unknown = type(error).__name__ == 'UnknownROSArgsError'
+        return _refuse(f'unknown argument {error} behind --ros-args' if unknown else str(error))
     set_logger_level('rcl', LoggingSeverity.UNSET)
     stop.started()
     try:

@@ -11,20 +11,18 @@ from typing import Any
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped, TransformStamped, TwistStamped
-from rclpy.event_handler import PublisherEventCallbacks, UnsupportedEventTypeError
-from rclpy.node import Node
-from rclpy.publisher import Publisher
-from rclpy.qos_overriding_options import QoSOverridingOptions, QoSPolicyKind
-
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.ros.configuration import Configuration
 from icub_leg_fk.ros.joint_stream import OnReady
 from icub_leg_fk.ros.pose_cdr import PoseStampedEncoder
+from icub_leg_fk.ros.qos_overrides import OVERRIDABLE
 from icub_leg_fk.ros.twist import tip_twist
+from rclpy.event_handler import PublisherEventCallbacks, UnsupportedEventTypeError
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile
 
 _DEPTH = 10
-OVERRIDABLE = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY,
-               QoSPolicyKind.DURABILITY)
 
 
 class Outputs:
@@ -74,22 +72,25 @@ class Outputs:
                 for index, chain in enumerate(self._configuration.chains)]
 
     def _create(self, topic: str, message_type: Any) -> Publisher:
-        options = QoSOverridingOptions(policy_kinds=OVERRIDABLE)
+        qos = QoSProfile(depth=_DEPTH)
         if self._events_supported:
             events = PublisherEventCallbacks(matched=lambda info: self._on_change())
             try:
-                return self._node.create_publisher(message_type, topic, _DEPTH,
+                return self._node.create_publisher(message_type, topic, qos,
                                                    event_callbacks=events,
-                                                   qos_overriding_options=options)
+                                                   qos_overriding_options=OVERRIDABLE)
             except UnsupportedEventTypeError:
                 self._events_supported = False
-        return self._node.create_publisher(message_type, topic, _DEPTH,
-                                           qos_overriding_options=options)
+        return self._node.create_publisher(message_type, topic, qos,
+                                           qos_overriding_options=OVERRIDABLE)
 
     def _wanted(self, topic: str) -> bool:
         publisher = self._publishers.get(topic)
-        return publisher is not None and (
-            not self._events_supported or publisher.get_subscription_count() > 0)
+        if publisher is None:
+            return False
+        for_late_ones = publisher.qos_profile.durability is DurabilityPolicy.TRANSIENT_LOCAL
+        return (for_late_ones or not self._events_supported
+                or publisher.get_subscription_count() > 0)
 
     def _handler(self, index: int, chain: Chain, configuration: Configuration) -> OnReady | None:
         steps: list[OnReady] = []
@@ -102,18 +103,18 @@ class Outputs:
             steps.append(self._tf_step(chain, configuration))
         if self._wanted('~/skeleton'):
             steps.append(self._skeleton_step(chain, configuration))
-        if configuration.stamp_now:
-            steps = [self._restamped(step) for step in steps]
-        if len(steps) <= 1:
-            return steps[0] if steps else None
-        return _all_of(steps)
+        if not steps:
+            return None
+        step = steps[0] if len(steps) == 1 else _all_of(steps)
+        return self._restamped(step) if configuration.stamp_now else step
 
     def _restamped(self, step: OnReady) -> OnReady:
         now = self._node.get_clock().now
 
         def restamped(sec: int, nanosec: int, q: Sequence[float],
                       qdot: Sequence[float] | None) -> None:
-            step(*divmod(now().nanoseconds, 1_000_000_000), q, qdot)
+            sec, nanosec = divmod(now().nanoseconds, 1_000_000_000)
+            step(sec, nanosec, q, qdot)
         return restamped
 
     def _pose_step(self, chain: Chain, configuration: Configuration,

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
+from icub_leg_fk.errors import LegFKError, ParameterError
+from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.kinematics.catalog import FOOT_FRAMES
+from icub_leg_fk.ros.configuration import Configuration, STAMP_SOURCES, version_parameter
+from icub_leg_fk.ros.qos_overrides import check_qos_override, PREFIX
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
 from rclpy.exceptions import ParameterException, ParameterUninitializedException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-
-from icub_leg_fk.errors import LegFKError, ParameterError
-from icub_leg_fk.kinematics import Catalog
-from icub_leg_fk.kinematics.catalog import FOOT_FRAMES
-from icub_leg_fk.ros.configuration import STAMP_SOURCES, Configuration, version_parameter
 
 _LONGEST_TIMEOUT = 1e6  # s
 
@@ -33,13 +33,13 @@ _PARAMETERS = (
                'a version in the kinematics file'),
     _Parameter('kinematics_file', '', 'Kinematics file to read; empty is the shipped one.',
                'path of a YAML file'),
-    _Parameter('foot_frame', 'dh', 'Axes of the tip: the table\'s last frame, or the sole.',
+    _Parameter('foot_frame', 'dh', "Axes of the tip: the table's last frame, or the sole.",
                ' or '.join(FOOT_FRAMES)),
     _Parameter('frame_prefix', '', 'Put before every frame id.', 'printable, no space'),
     _Parameter('joint_timeout', 0.5, 'Age of a joint beside the newest of its chain above which '
                'the chain is held back [s]; 0 turns this off.', '', _LONGEST_TIMEOUT),
-    _Parameter('stamp_source', 'message', 'Stamp of the poses: the message\'s, or the node\'s '
-               'time; a zero message stamp always becomes the node\'s time.',
+    _Parameter('stamp_source', 'message', "Stamp of the poses: the message's, or the node's "
+               "time; a zero message stamp always becomes the node's time.",
                ' or '.join(STAMP_SOURCES)),
     _Parameter('publish_tf', False, 'Also broadcast the poses as transforms (needs tf2_ros).'),
     _Parameter('publish_twist', False, 'Also publish the velocity of the tips.'),
@@ -103,8 +103,15 @@ class NodeParameters:
         """Refuse overrides that name no parameter, which rclpy would pass over in silence."""
         known = [*(parameter.name for parameter in _PARAMETERS),
                  *map(version_parameter, self._catalog.chains), *_FOREIGN]
-        for name in self._node._parameter_overrides:
-            if name not in known and not name.startswith('qos_overrides.'):
+        resolve = self._node.resolve_topic_name
+        roles = {resolve('joint_states'): 'subscription'}
+        roles |= {resolve(f'~/{entry.tip}/{kind}'): 'publisher'
+                  for entry in self._catalog.chains.values() for kind in ('pose', 'twist')}
+        roles[resolve('~/skeleton')] = 'publisher'
+        for name, override in self._node._parameter_overrides.items():
+            if name.startswith(PREFIX):
+                check_qos_override(name, override.value, roles)
+            elif name not in known:
                 raise ParameterError(f'parameter {name}: found no such parameter, allowed: '
                                      f'{", ".join(known)}')
 
