@@ -16,7 +16,7 @@ MARKER = Path('share/ament_index/resource_index/packages/icub_leg_fk')
 SHARE = Path('share/icub_leg_fk')
 COMMANDS = ('foot_pose_publisher', 'leg_fk')
 # What `colcon test` is tried on here; all of it would be this very run once more.
-COLCON_TESTS = 'test_gait or test_node_parameters'
+COLCON_TESTS = 'test_gait or test_launch'
 # Settings of this interpreter's own ROS, which another one must not inherit.
 FOREIGN = ('PYTHONPATH', 'LD_LIBRARY_PATH', 'AMENT_PREFIX_PATH', 'VIRTUAL_ENV',
            '_ROS_WHEELS_BOOTSTRAP_COMPLETE', 'PYTEST_ADDOPTS', 'MAKEFLAGS')
