@@ -1,0 +1,67 @@
+"""geometry_msgs/TwistStamped and tf2_msgs/TFMessage to their CDR bytes, little-endian."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import struct
+
+from icub_leg_fk.kinematics.solver import Pose
+
+_ENCAPSULATION = b'\x00\x01\x00\x00'
+
+
+class TwistStampedEncoder:
+    """Serializes TwistStamped messages of one frame id.
+
+    Args:
+        frame_id: the frame in whose axes the twists are given.
+    """
+
+    def __init__(self, frame_id: str) -> None:
+        self._frame_id = _aligned(8, _string(frame_id))
+        self._pack = struct.Struct(f'<4siI{len(self._frame_id)}s6d').pack
+
+    def encode(self, sec: int, nanosec: int, twist: Sequence[float]) -> bytes:
+        """Return the bytes of one message.
+
+        Args:
+            sec: seconds of the stamp.
+            nanosec: nanoseconds of the stamp.
+            twist: linear x, y, z [m/s] and angular x, y, z [rad/s].
+        """
+        return self._pack(_ENCAPSULATION, sec, nanosec, self._frame_id, *twist)
+
+
+class TransformEncoder:
+    """Serializes TFMessages that hold one transform between two frames.
+
+    Args:
+        frame_id: the frame the poses are given in.
+        child_frame_id: the frame whose poses they are.
+    """
+
+    def __init__(self, frame_id: str, child_frame_id: str) -> None:
+        names = _string(frame_id)
+        names += bytes(-len(names) % 4) + _string(child_frame_id)
+        self._names = _aligned(12, names)
+        self._pack = struct.Struct(f'<4sIiI{len(self._names)}s7d').pack
+
+    def encode(self, sec: int, nanosec: int, pose: Pose) -> bytes:
+        """Return the bytes of one message.
+
+        Args:
+            sec: seconds of the stamp.
+            nanosec: nanoseconds of the stamp.
+            pose: x, y, z [m], qx, qy, qz, qw.
+        """
+        return self._pack(_ENCAPSULATION, 1, sec, nanosec, self._names, *pose)
+
+
+def _string(text: str) -> bytes:
+    data = text.encode() + b'\x00'
+    return struct.pack('<I', len(data)) + data
+
+
+def _aligned(before: int, data: bytes) -> bytes:
+    """Pad data that so many bytes stand before, so that doubles can follow."""
+    return data + bytes(-(before + len(data)) % 8)

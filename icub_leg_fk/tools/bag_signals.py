@@ -1,0 +1,24 @@
+"""Signals that ask a process to stop, as an exception that lets it clean up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+import signal
+from types import FrameType
+
+
+@contextmanager
+def stop_on_signals() -> Iterator[None]:
+    """Raise SystemExit on SIGTERM and SIGHUP, with the status that a shell reports for them."""
+    numbers = (signal.SIGTERM, signal.SIGHUP)
+    before = {number: signal.signal(number, _stop) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _stop(number: int, frame: FrameType | None) -> None:
+    raise SystemExit(128 + number)

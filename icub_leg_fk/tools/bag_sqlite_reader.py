@@ -1,0 +1,136 @@
+"""Reads the messages of one sqlite3 file of a bag in blocks, whole or not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import closing
+from pathlib import Path
+import sqlite3
+from urllib.parse import quote
+
+from icub_leg_fk.tools.bag_topics import Message, Topic
+
+_BLOCK = 1 << 20  # bytes
+_ROWS = 4096
+_FIRST_LEAP = 1_000_000  # ns
+_TOO_FAR = 1 << 60
+_COLUMNS = 'SELECT topic_id, timestamp, id, data FROM messages'
+_BY_TIME = (f'{_COLUMNS} WHERE timestamp >= ?1 AND (timestamp > ?1 OR id > ?2) '
+            'ORDER BY timestamp, id')
+_BY_NUMBER = (f'{_COLUMNS} NOT INDEXED WHERE timestamp >= 0 AND id > ?2 '
+              'ORDER BY id')  # the order of recording
+
+
+class SqliteFile:
+    """One sqlite3 file.
+
+    Attributes:
+        path: the file.
+        topics: its topics by their id.
+        damage: what could not be read.
+        compression: none; here for the likeness of MCAP.
+        attachments: none.
+        done: bytes read so far.
+    """
+
+    compression = ''
+    attachments = 0
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.topics: dict[int, Topic] = {}
+        self.damage: list[str] = []
+        self.done = 0
+        try:
+            with closing(self._connect()) as database:
+                self._describe(database)
+        except (sqlite3.Error, ValueError) as error:
+            self.damage.append(f'topics cannot be read: {error}')
+
+    def blocks(self, indices: Mapping[int, int]) -> Iterator[list[Message]]:
+        """Yield the messages in order of their time, some at a time.
+
+        Args:
+            indices: index that a message's topic is to have, by topic id; others are left out.
+        """
+        if not self.topics:
+            return
+        with closing(self._connect()) as database:
+            yield from self._blocks(database, indices)
+
+    def _connect(self) -> sqlite3.Connection:
+        """Open the file for reading; with its write-ahead log, if a killed recorder left one."""
+        log = Path(f'{self.path}-wal')
+        access = 'mode=ro' if log.exists() and log.stat().st_size else 'immutable=1'
+        database = sqlite3.connect(f'file:{quote(str(self.path))}?{access}', uri=True)
+        database.text_factory = lambda data: data.decode('utf-8', 'replace')
+        return database
+
+    def _describe(self, database: sqlite3.Connection) -> None:
+        # Older recorders had fewer columns and no definitions; see rosbag2's sqlite_storage.cpp.
+        known = {row[1] for row in database.execute('PRAGMA table_info(topics)')}
+        columns = ', '.join(
+            column if column in known else "''" for column in
+            ('name', 'type', 'serialization_format', 'offered_qos_profiles',
+             'type_description_hash'))
+        definitions = {}
+        if database.execute('PRAGMA table_info(message_definitions)').fetchall():
+            definitions = {row[0]: row[1:] for row in database.execute(
+                'SELECT topic_type, encoding, encoded_message_definition '
+                'FROM message_definitions')}
+        for number, *fields in database.execute(f'SELECT id, {columns} FROM topics ORDER BY id'):
+            self.topics[number] = Topic(*fields, *definitions.get(fields[1], ('', '')))
+
+    def _blocks(self, database: sqlite3.Connection,
+                indices: Mapping[int, int]) -> Iterator[list[Message]]:
+        block: list[Message] = []
+        size, odd = 0, 0
+        query, leap = _BY_TIME, 0
+        place = _first_time(database), -1
+        while leap < _TOO_FAR:
+            try:
+                for topic, time, number, data in database.execute(query, place):
+                    place, leap = (time, number), 0
+                    if type(data) is not bytes or topic not in self.topics:
+                        odd += 1
+                        continue
+                    size += len(data)
+                    if topic in indices:
+                        block.append((indices[topic], 0, time, time, data))
+                    if size >= _BLOCK or len(block) >= _ROWS:
+                        self.done += size
+                        yield block
+                        block, size = [], 0
+                break
+            except sqlite3.DatabaseError as error:
+                # Leap over what is damaged, twice as far each time that leads nowhere.
+                time, number = place
+                if not leap:
+                    self.damage.append(f'messages behind number {number} (at {time / 1e9:.3f} s) '
+                                       f'are unreadable: {error}')
+                    if query is _BY_TIME and not _index_is_readable(database):
+                        query = _BY_NUMBER
+                leap = 2 * leap or (1 if query is _BY_NUMBER else _FIRST_LEAP)
+                place = (time, number + leap) if query is _BY_NUMBER else (time + leap, -1)
+        self.done += size
+        if odd:
+            self.damage.append(f'{odd} messages have no topic or no data')
+        if block:
+            yield block
+
+
+def _first_time(database: sqlite3.Connection) -> int:
+    try:
+        found = database.execute('SELECT min(timestamp) FROM messages '
+                                 'WHERE timestamp >= 0').fetchone()[0]
+    except sqlite3.DatabaseError:
+        return 0
+    return found if isinstance(found, int) else 0
+
+
+def _index_is_readable(database: sqlite3.Connection) -> bool:
+    try:
+        database.execute('SELECT count(timestamp) FROM messages WHERE timestamp >= 0').fetchone()
+    except sqlite3.DatabaseError:
+        return False
+    return True
