@@ -4,12 +4,11 @@ from collections import Counter
 import math
 import struct
 
-from joint_model import JointModel, LARGEST, Message
-
 from icub_leg_fk.errors import MalformedMessageError
 from icub_leg_fk.ros.joint_input import JointInput
 from icub_leg_fk.ros.joint_state_cdr import decode_joint_state
 from icub_leg_fk.ros.joint_stream import JointStream
+from joint_model import JointModel, LARGEST, Message
 
 SECOND = 1_000_000_000
 SPECIAL = (math.nan, math.inf, -math.inf, 0.0, -0.0, 1.0, math.nextafter(1.0, 2.0), -1.0, 0.5,
@@ -22,8 +21,9 @@ def bits(values):
 
 
 class Trial:
-    """Every message goes to a `JointModel`, a `JointInput`, a `JointStream` that takes the fast
-    way where it can, and one that cannot; what comes out is compared after each message.
+    """A model, a plain input, a stream that takes the fast way where it can and one that cannot.
+
+    Every message goes to all four, and what comes out is compared after each.
     """
 
     def __init__(self, chains, timeout=SECOND // 2):
@@ -123,6 +123,7 @@ class Traffic:
         self.chains = [chain.joint_names for chain in chains]
         self.joints = list(dict.fromkeys(name for names in self.chains for name in names))
         self.publishers = [self._publisher() for _ in range(rng.choice((1, 2, 3, 5, 12)))]
+        self.last = {}
         self.faults = rng.choice((0.0, 0.02, 0.2, 0.6))
         self.stamp = rng.choice((0, 7, 1_700_000_000, -3, 2**31 - 20)) * SECOND
         self.step = rng.choice((1, 1_000_000, 10_000_000, 300_000_000))
@@ -146,12 +147,13 @@ class Traffic:
     def next(self):
         """Return a message, well-formed if not always sensible."""
         rng = self.rng
-        names, lengths, frame_id, order, extra = rng.choice(self.publishers)
+        publisher = rng.choice(self.publishers)
+        names, lengths, frame_id, order, extra = publisher
         self.stamp += self.step
         stamp = self.stamp
         positions, velocities, efforts = map(self._values, lengths)
         if rng.random() < self.faults:
-            fault = rng.randrange(9)
+            fault = rng.randrange(10)
             if fault == 0 and positions:
                 positions[rng.randrange(len(positions))] = rng.choice(SPECIAL)
             elif fault == 1:
@@ -170,8 +172,11 @@ class Traffic:
                 velocities[rng.randrange(len(velocities))] = rng.choice(SPECIAL)
             elif fault == 7:
                 velocities, efforts = efforts, velocities
+            elif fault == 8:  # the same time again, while others have gone on
+                stamp = self.last.get(publisher, stamp)
             else:
                 positions = positions[:rng.randint(0, len(positions))]
+        self.last[publisher] = stamp
         sec, nanosec = divmod(stamp, SECOND)
         sec = min(max(sec, -2**31), 2**31 - 1)
         if rng.random() < 0.05:  # some publishers do not carry over; it is the same time

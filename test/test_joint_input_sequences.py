@@ -11,12 +11,11 @@ from hypothesis.stateful import (
     RuleBasedStateMachine,
     run_state_machine_as_test,
 )
+from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.ros import joint_stream
 from joint_model import CATALOG, Message
 from joint_trial import SECOND, SPECIAL, Traffic, Trial
 import pytest
-
-from icub_leg_fk.kinematics import Catalog
-from icub_leg_fk.ros import joint_stream
 
 MESSAGES = 120_000
 SEQUENCE = 1000

@@ -5,8 +5,8 @@ read or allocated. Layout (OMG CDR, rosidl): encapsulation (4 bytes), stamp sec 
 frame_id, name[], position[], velocity[], effort[]; alignment counts from the fifth byte. Padding
 may hold anything: Fast CDR leaves in it what was in the buffer before.
 
-What Fast CDR takes and this refuses: a parameter-list encapsulation (0x0002, 0x0003), which
-no JointState has; a string without NUL at its end, or with one before it.
+What Fast CDR takes and this refuses: encapsulations other than plain CDR, in which no ROS
+middleware sends a JointState; a string without NUL at its end, or with one before it.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import NamedTuple
 from icub_leg_fk.errors import MalformedMessageError
 
 _BYTE_ORDER = {b'\x00\x01': '<', b'\x00\x00': '>'}
+_UINT32 = {order: struct.Struct(f'{order}I').unpack_from for order in '<>'}
 STAMP_END = 12  # encapsulation and stamp; frame_id follows
 
 
@@ -62,7 +63,7 @@ def decode_joint_state(data: bytes) -> JointStateMessage:
         raise MalformedMessageError(
             f'JointState: encapsulation found 0x{bytes(data[:2]).hex()}, allowed: 0x0000, 0x0001')
     reader = _Reader(data, byte_order)
-    sec, nanosec = reader.unpack('header.stamp', 'iI')
+    sec, nanosec = reader.stamp()
     reader.string('header.frame_id')
     # A string takes at least its length field, so the count cannot exceed a quarter of the rest.
     names = tuple([reader.string('name') for _ in range(reader.count('name', 4))])
@@ -82,45 +83,43 @@ class _Reader:
     def __init__(self, data: bytes, byte_order: str) -> None:
         self.padding: list[tuple[int, int]] = []
         self._data = data
+        self._size = len(data)
         self._order = byte_order
+        self._uint32 = _UINT32[byte_order]
         self._at = 4
 
     def align(self, size: int) -> int:
         """Return the next offset that is a multiple of size, and go there."""
-        padding = -(self._at - 4) % size
+        padding = (4 - self._at) % size
         if padding:
             self.padding.append((self._at, padding))
             self._at += padding
         return self._at
 
-    def _take(self, field: str, size: int) -> int:
-        start, end = self._at, self._at + size
-        if end > len(self._data):
-            raise MalformedMessageError(
-                f'JointState: {field} found to end at byte {end}, allowed: {len(self._data)}')
-        self._at = end
-        return start
-
-    def unpack(self, field: str, fmt: str) -> tuple[int, ...]:
-        fmt = self._order + fmt
-        return struct.unpack_from(fmt, self._data, self._take(field, struct.calcsize(fmt)))
+    def stamp(self) -> tuple[int, int]:
+        """Return seconds and nanoseconds."""
+        sec, nanosec = struct.unpack_from(
+            f'{self._order}iI', self._data, self._take('header.stamp', 8))
+        return sec, nanosec
 
     def count(self, field: str, item_size: int) -> int:
+        """Return the count of items that follow; they fit in what is left."""
         self.align(4)
-        count = self.unpack(field, 'I')[0]
-        if count * item_size > len(self._data) - self._at:
+        count: int = self._uint32(self._data, self._take(field, 4))[0]
+        if count * item_size > self._size - self._at:
             raise MalformedMessageError(
                 f'JointState: {field} found {count} items, '
-                f'allowed: what fits in {len(self._data) - self._at} bytes')
+                f'allowed: what fits in {self._size - self._at} bytes')
         return count
 
     def string(self, field: str) -> str:
+        """Return a string, which takes its length and that many bytes, the last one NUL."""
         size = self.count(field, 1)
         start = self._take(field, size)
-        text = self._data[start:start + size]
-        if size and text.find(b'\x00') != size - 1:
+        text = self._data[start:self._at]
+        if size and text.find(0) != size - 1:
             raise MalformedMessageError(f'JointState: {field} is no string that ends with NUL')
-        return bytes(text[:-1]).decode('utf-8', 'replace')
+        return text[:-1].decode('utf-8', 'replace')
 
     def doubles(self, field: str) -> tuple[int, tuple[float, ...]]:
         """Return the offset of the first number, and the numbers."""
@@ -129,3 +128,12 @@ class _Reader:
             self.align(8)
         start = self._take(field, 8 * count)
         return start, struct.unpack_from(f'{self._order}{count}d', self._data, start)
+
+    def _take(self, field: str, size: int) -> int:
+        """Return the present offset and go on behind as many bytes."""
+        start = self._at
+        self._at = end = start + size
+        if end > self._size:
+            raise MalformedMessageError(
+                f'JointState: {field} found to end at byte {end}, allowed: {self._size}')
+        return start
