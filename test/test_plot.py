@@ -10,13 +10,13 @@ import pytest
 
 pytest.importorskip('matplotlib')
 
-from icub_leg_fk.kinematics import Catalog  # noqa: E402
-from icub_leg_fk.tools.gait import walk  # noqa: E402
-from icub_leg_fk.tools.leg_fk import main  # noqa: E402
-from icub_leg_fk.tools.pictures import feet_figure  # noqa: E402
-from icub_leg_fk.tools.pictures_time import gaps, violations  # noqa: E402
-from icub_leg_fk.tools.plot import chosen_chains, telling_instants  # noqa: E402
-from icub_leg_fk.tools.recording import ChainTrack  # noqa: E402
+from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.tools.gait import walk
+from icub_leg_fk.tools.leg_fk import main
+from icub_leg_fk.tools.pictures import feet_figure
+from icub_leg_fk.tools.pictures_time import gaps, violations
+from icub_leg_fk.tools.plot import chosen_chains, telling_instants
+from icub_leg_fk.tools.recording import ChainTrack
 
 JOINTS = [f'{side}_{joint}' for side in 'lr' for joint in (
     'hip_pitch', 'hip_roll', 'hip_yaw', 'knee', 'ankle_pitch', 'ankle_roll')]
@@ -151,7 +151,7 @@ def test_long_curves_are_thinned_without_losing_their_extremes(tracks):
 
 def test_default_instants_show_each_foot_lifted_and_ahead(tracks):
     left, right = (track.poses for track in tracks)
-    rows = [int(round(instant * 100)) for instant in telling_instants(tracks)]
+    rows = [round(instant * 100) for instant in telling_instants(tracks)]
     apart = (left - right)[rows]
     assert len(rows) == 4
     assert apart[:, 2].max() > 0.04

@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.tools import pictures_legs as legs
 from icub_leg_fk.tools import pictures_time as over_time
-from icub_leg_fk.tools.pictures_style import AXIS_COLORS, color_of, FAINT, INK, label_of, SLIDE
+from icub_leg_fk.tools.pictures_style import (
+    AXIS_COLORS,
+    color_of,
+    FAINT,
+    INK,
+    label_of,
+    MINUS,
+    SLIDE,
+)
 from icub_leg_fk.tools.recording import ChainTrack
 import numpy as np
 
@@ -62,6 +70,62 @@ def feet_figure(tracks: Sequence[ChainTrack], instants: Sequence[float], title: 
         view.axes.set_title(f'{letter}  {instant:.2f} s', x=0.04, y=0.93)
     _share_limits(views)
     return figure
+
+
+def walk_figure(tracks: Sequence[ChainTrack], paths: Sequence[Array], title: str,
+                soled: Collection[str]) -> Figure:
+    """Return the chains in space at one instant and shortly before, and their tips' paths.
+
+    Args:
+        tracks: what the chains did; at least one sample each, at the same times.
+        paths: (N, 7) poses of their tips, as they were received, one array per chain.
+        title: what the picture shows.
+        soled: names of the chains that end in a foot.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=SLIDE)
+    _title(figure, title, tracks)
+    view = legs.View(figure.add_axes((0.01, 0.02, 0.53, 0.87)), azimuth=236.0, elevation=15.0)
+    times = tracks[0].times
+    later = np.searchsorted(times, (times[0] + times[-1]) / 2)  # after the start has settled
+    # The view is from the left: with the right foot ahead no leg hides the other.
+    ahead = tracks[0].poses[later:, 0] - tracks[-1].poses[later:, 0]
+    row = int(later + np.argmax(ahead))
+    scene = [(track, row) for track in tracks]
+    for ghost in np.searchsorted(times, times[row] + TRAIL / 5 * np.arange(-5, 0)):
+        for track in tracks:
+            legs.draw_leg(view, track.chain, track.positions[ghost], False, 4.0, alpha=0.14)
+    _draw_scene(view, scene, _floor(scene), soled)
+    _share_limits([view])
+    _draw_paths(figure, tracks, paths)
+    return figure
+
+
+def _draw_paths(figure: Figure, tracks: Sequence[ChainTrack], paths: Sequence[Array]) -> None:
+    """Draw the tips' paths from the side and from above, in one scale."""
+    points = np.vstack(paths)[:, :3] * (-1.0, -1.0, 1.0)
+    low, high = points.min(axis=0) - 0.015, points.max(axis=0) + 0.015
+    forward, left, up = (high - low).tolist()
+    left_edge, width, top, height, between = 0.615, 0.365, 0.835, 0.645, 0.105
+    inches = min(width * SLIDE[0] / forward, height * SLIDE[1] / (left + up))  # per metre
+    for name, size, column, sign, label in (
+            ('side', up, 2, 1.0, 'height  z  [m]'),
+            ('above', left, 1, -1.0, f'left  {MINUS}y  [m]')):
+        tall = size * inches / SLIDE[1]
+        panel = figure.add_axes((left_edge, top - tall, forward * inches / SLIDE[0], tall))
+        for i, (track, path) in enumerate(zip(tracks, paths, strict=True)):
+            # Where feet share a path both are seen: the first one is drawn broad.
+            panel.plot(-path[:, 0], sign * path[:, column], color=color_of(track.chain),
+                       linewidth=1.6 if i else 4.5 if name == 'side' else 1.6)
+        panel.set_xlim(low[0], high[0])
+        panel.set_ylim(low[column], high[column])
+        panel.locator_params(nbins=max(2, int(tall * 16)), axis='y')
+        panel.locator_params(nbins=5, axis='x')
+        panel.set_title(f'paths from {"the " * (name == "side")}{name}')
+        panel.set_ylabel(label)
+        top -= tall + between
+    panel.set_xlabel(f'forward  {MINUS}x  [m]')
 
 
 def _draw_scene(view: legs.View, scene: Sequence[Sample], floor: tuple[Array, Array],

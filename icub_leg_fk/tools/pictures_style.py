@@ -48,12 +48,19 @@ def label_of(chain: Chain) -> str:
 
 
 def check_output(path: Path, force: bool) -> None:
-    """Refuse a picture file before any work is done for it.
+    """Refuse a picture that cannot be, before any work is done for it.
 
     Raises:
+        MissingDependencyError: matplotlib is not installed.
         OutputFileError: its format is unknown, it exists and `force` is not set, or its
             directory does not exist.
     """
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError as error:
+        raise MissingDependencyError(
+            'pictures need matplotlib: pip install matplotlib (rosdep key python3-matplotlib)'
+        ) from error
     if path.suffix.lower() not in FORMATS:
         raise OutputFileError(f'{path}: found {path.suffix or "no ending"}, allowed: '
                               f'{", ".join(FORMATS)}')
@@ -70,18 +77,13 @@ def save_picture(draw: Callable[[], Figure], path: Path) -> None:
 
     Args:
         draw: returns the figure.
-        path: file to write or replace; its ending is one of `FORMATS`.
+        path: file to write or replace, good by `check_output`.
 
     Raises:
-        MissingDependencyError: matplotlib is not installed.
         OutputFileError: the file cannot be written.
     """
-    try:
-        from matplotlib import rc_context
-    except ImportError as error:
-        raise MissingDependencyError(
-            'pictures need matplotlib: pip install matplotlib (rosdep key python3-matplotlib)'
-        ) from error
+    from matplotlib import rc_context
+
     kind = path.suffix.lower().lstrip('.')
     # Without dates the same picture is the same file.
     metadata = {'svg': {'Date': None}, 'pdf': {'CreationDate': None}}.get(kind)

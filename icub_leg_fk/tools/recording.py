@@ -35,6 +35,12 @@ class JointRecording:
     positions: Array
     velocities: Array | None = None
 
+    def first(self, seconds: float) -> JointRecording:
+        """Return the part up to a time after the first sample [s]."""
+        n = int(np.searchsorted(self.times, self.times[0] + seconds, side='right'))
+        return JointRecording(self.joint_names, self.times[:n], self.positions[:n],
+                              None if self.velocities is None else self.velocities[:n])
+
     def track(self, chain: Chain) -> ChainTrack:
         """Return what one chain did; its joints must be in the recording."""
         columns = [self.joint_names.index(name) for name in chain.joint_names]

@@ -1,0 +1,210 @@
+"""Plays joint positions to the node over DDS, in their own timing, and collects the poses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import time
+from typing import Any
+
+from icub_leg_fk.errors import LegFKError, MissingDependencyError
+from icub_leg_fk.kinematics.rotation import Array
+from icub_leg_fk.tools.recording import JointRecording
+import numpy as np
+
+DISCOVERY_TIMEOUT = 20.0  # s
+LAST_POSE_TIMEOUT = 5.0  # s without a pose, after the last message
+DEPTH = 1000  # messages that may wait anywhere when a process is held up
+_PROBE_PERIOD = 0.1  # s
+
+
+class ReplayError(LegFKError):
+    """The messages could not be played or no answer came."""
+
+
+@dataclass
+class Answers:
+    """The poses of one tip.
+
+    Attributes:
+        tip: name of the tip.
+        poses: (N, 7) rows x, y, z [m], qx, qy, qz, qw by message; NaN where none has come.
+        latencies: (N,) from publishing the message to receiving the pose [s]; NaN likewise.
+        unasked: poses received that belong to no message, or to one that had a pose.
+        newest: index of the message whose pose came last, or -1.
+    """
+
+    tip: str
+    poses: Array
+    latencies: Array
+    unasked: int = 0
+    newest: int = -1
+
+    @property
+    def arrived(self) -> int:
+        """How many messages have their pose."""
+        return int(np.isfinite(self.latencies).sum())
+
+
+class Replay:
+    """Publisher of joint states and subscriber of poses; use as a context manager.
+
+    Args:
+        recording: what to play.
+        namespace: namespace of the node.
+        tips: tips whose poses to collect.
+
+    Attributes:
+        answers: what has come, per tip.
+        sent: messages published.
+    """
+
+    def __init__(self, recording: JointRecording, namespace: str, tips: tuple[str, ...]) -> None:
+        self._recording = recording
+        self._namespace = namespace
+        count = len(recording.times)
+        self.answers = [Answers(tip, np.full((count, 7), np.nan), np.full(count, np.nan))
+                        for tip in tips]
+        self.sent = 0
+        self._published = np.zeros(count)
+        self._message_of: dict[int, int] = {}  # by stamp [ns]
+        self._last_stamp = 0
+        self._probes: set[int] = set()
+        self._answered_probe: set[str] = set()
+
+    def __enter__(self) -> Replay:
+        try:
+            import rclpy
+            from rclpy.context import Context
+            from rclpy.executors import SingleThreadedExecutor
+            from rclpy.signals import SignalHandlerOptions
+            from sensor_msgs.msg import JointState
+        except ImportError as error:
+            raise MissingDependencyError(
+                f'the demonstration needs rclpy ({error}): source ROS 2, or pip install '
+                'icub_leg_fk[ros]') from error
+        self._context = Context()
+        try:
+            rclpy.init(args=[], context=self._context,
+                       signal_handler_options=SignalHandlerOptions.NO)
+            self._node = rclpy.create_node(
+                'leg_fk_demo', namespace=self._namespace, context=self._context,
+                use_global_arguments=False, enable_rosout=False, start_parameter_services=False)
+        except (RuntimeError, ValueError) as error:  # what rclpy raises for what rcl refuses
+            raise ReplayError(f'ROS 2 cannot be started: {" ".join(str(error).split())}'
+                              ) from error
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._joint_state = JointState
+        self._publisher = self._node.create_publisher(JointState, 'joint_states', DEPTH)
+        self._subscriptions = [self._subscribe(answers) for answers in self.answers]
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._executor.shutdown()
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    def wait_for_node(self, check: Callable[[], None]) -> None:
+        """Wait until the node and this process have found each other, in both directions.
+
+        What this process has matched the node may not have yet. So, once matched here, single
+        messages are sent, which do not count, until each tip has answered one.
+
+        Args:
+            check: called again and again; raises if there is no hope.
+
+        Raises:
+            ReplayError: they have not found each other in time.
+        """
+        deadline = time.monotonic() + DISCOVERY_TIMEOUT
+        next_probe = 0.0
+        while len(self._answered_probe) < len(self.answers):
+            check()
+            now = time.monotonic()
+            if now > deadline:
+                raise ReplayError(f'the node was not found over DDS in {DISCOVERY_TIMEOUT:g} s')
+            if self._matched() and now >= next_probe:
+                next_probe = now + _PROBE_PERIOD
+                stamp = time.time_ns()
+                self._probes.add(stamp)
+                self._publish(stamp, 0)
+            self._executor.spin_once(timeout_sec=0.02)
+
+    def play(self, on_time: Callable[[float], None], period: float, check: Callable[[], None]
+             ) -> None:
+        """Publish every message at its time and wait for the poses.
+
+        Args:
+            on_time: called with the time since the first message [s], every `period` seconds.
+            period: see there.
+            check: called as often; raises if there is no hope.
+        """
+        times = self._recording.times - self._recording.times[0]
+        start, start_ns = time.monotonic(), time.time_ns()
+        next_call = start
+        for index, offset in enumerate(times.tolist()):
+            while (now := time.monotonic()) < start + offset:
+                if now >= next_call:
+                    next_call += period
+                    check()
+                    on_time(now - start)
+                # A negative timeout would be none.
+                wait = min(start + offset, next_call) - now
+                self._executor.spin_once(timeout_sec=max(wait, 0.0))
+            stamp = max(start_ns + round(offset * 1e9), self._last_stamp + 1)
+            self._message_of[stamp] = index
+            self._published[index] = time.monotonic()
+            self._publish(stamp, index)
+            self.sent += 1
+        self._await_the_rest(check)
+        on_time(float(times[-1]))
+
+    def _await_the_rest(self, check: Callable[[], None]) -> None:
+        arrived, deadline = -1, 0.0
+        while (now := self._arrived()) < self.sent * len(self.answers):
+            if now > arrived:
+                arrived, deadline = now, time.monotonic() + LAST_POSE_TIMEOUT
+            if time.monotonic() > deadline:
+                return
+            check()
+            self._executor.spin_once(timeout_sec=0.1)
+
+    def _arrived(self) -> int:
+        return sum(answers.arrived for answers in self.answers)
+
+    def _matched(self) -> bool:
+        return self._publisher.get_subscription_count() > 0 and all(
+            self._node.count_publishers(subscription.topic_name)
+            for subscription in self._subscriptions)
+
+    def _subscribe(self, answers: Answers) -> Any:
+        from geometry_msgs.msg import PoseStamped
+
+        def take(message: PoseStamped) -> None:
+            now = time.monotonic()
+            stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
+            if stamp in self._probes:
+                self._answered_probe.add(answers.tip)
+                return
+            index = self._message_of.get(stamp, -1)
+            if index < 0 or not np.isnan(answers.latencies[index]):
+                answers.unasked += 1
+                return
+            p, q = message.pose.position, message.pose.orientation
+            answers.poses[index] = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
+            answers.latencies[index] = now - self._published[index]
+            answers.newest = index
+
+        topic = f'foot_pose_publisher/{answers.tip}/pose'
+        return self._node.create_subscription(PoseStamped, topic, take, DEPTH)
+
+    def _publish(self, stamp: int, index: int) -> None:
+        message = self._joint_state()
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
+        message.name = list(self._recording.joint_names)
+        message.position = self._recording.positions[index].tolist()
+        if self._recording.velocities is not None:
+            message.velocity = self._recording.velocities[index].tolist()
+        self._last_stamp = stamp
+        self._publisher.publish(message)

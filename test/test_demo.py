@@ -1,0 +1,282 @@
+"""`leg_fk demo`: the node in its own process over DDS, from outside."""
+
+import os
+from pathlib import Path
+import pty
+import re
+import select
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('matplotlib')
+
+from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.tools.demo import conclude
+from icub_leg_fk.tools.demo_node import NodeError, NodeProcess
+from icub_leg_fk.tools.demo_replay import Answers, Replay
+from icub_leg_fk.tools.gait import walk
+from icub_leg_fk.tools.leg_fk import main
+
+DEMO = (sys.executable, '-m', 'icub_leg_fk.tools.leg_fk', 'demo')
+TIPS = ('left_foot', 'right_foot')
+
+
+@pytest.fixture(autouse=True)
+def own_directory(tmp_path, monkeypatch):
+    root = str(Path(__file__).parents[1])
+    monkeypatch.setenv('PYTHONPATH', os.pathsep.join(
+        filter(None, (root, os.environ.get('PYTHONPATH')))))
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    monkeypatch.delenv('NO_COLOR', raising=False)
+    monkeypatch.chdir(tmp_path)
+
+
+def demo(*words, **environment):
+    return subprocess.run([*DEMO, *words], capture_output=True, text=True, check=False,
+                          timeout=90, env={**os.environ, **environment})
+
+
+def children(pid):
+    """Return the processes that a process has started and that still run."""
+    try:
+        return [int(word) for word in
+                Path(f'/proc/{pid}/task/{pid}/children').read_text().split()]
+    except OSError:
+        return []
+
+
+def runs(pid):
+    try:
+        return Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0] != 'Z'
+    except OSError:
+        return False
+
+
+def wait_until(condition, timeout=30.0):
+    deadline = time.monotonic() + timeout
+    while not (value := condition()):
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    return value
+
+
+def write_csv(path, times, names, positions):
+    """Write a recording with columns that the demonstration does not need."""
+    rows = [f'{t:.4f},0,' + ','.join(map(repr, q.tolist())) for t, q in zip(times, positions)]
+    path.write_text('\n'.join([f'time,force_z,{",".join(names)}', *rows]))
+    return path
+
+
+def test_every_pose_of_the_gait_arrives_and_is_drawn():
+    done = demo('--seconds', '3')
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ''
+    assert re.search(r'messages in +300\b', done.stdout)
+    assert re.search(r'poses out +600 +\(left_foot 300, right_foot 300\)', done.stdout)
+    assert re.search(r'lost +none', done.stdout)
+    assert re.search(r'latency +median [\d.]+ ms +p99 [\d.]+ ms +max [\d.]+ ms', done.stdout)
+    assert Path('demo.png').read_bytes().startswith(b'\x89PNG')
+
+
+def test_without_a_terminal_there_is_a_plain_line_a_second():
+    done = demo('--seconds', '2.5')
+    assert '\x1b' not in done.stdout
+    lines = re.findall(r'^ +([\d.]+) s .*left foot: x \S+  y \S+  z \S+ m   right foot: x \S+',
+                       done.stdout, re.MULTILINE)
+    assert [round(float(line)) for line in lines] == [1, 2, 2]  # and the last state
+
+
+def test_talks_inside_the_machine_in_a_domain_and_namespace_of_its_own(monkeypatch):
+    monkeypatch.delenv('ROS_DOMAIN_ID', raising=False)
+    (one, namespace), (two, other_namespace) = where_it_talks(), where_it_talks()
+    assert 1 <= one <= 101
+    assert 1 <= two <= 101
+    assert namespace != other_namespace
+
+
+def test_users_domain_stays(monkeypatch):
+    monkeypatch.setenv('ROS_DOMAIN_ID', '73')
+    assert where_it_talks()[0] == 73
+
+
+def where_it_talks():
+    process = subprocess.Popen(DEMO, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    for line in process.stdout:
+        if match := re.match(r'\(this machine only, ROS_DOMAIN_ID (\d+), namespace (\S+)\)', line):
+            break
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=30)
+    return int(match[1]), match[2]
+
+
+def test_recording_is_played_in_its_own_timing():
+    gait = walk(Catalog.load(), 'v2_5', seconds=1.0, rate=50.0)
+    times = np.cumsum(np.r_[5.0, np.tile([0.002, 0.04, 0.0], 17)[:49]])  # 0.7 s, from 5 s on
+    write_csv(Path('walk.csv'), times, gait.joint_names[::-1], gait.positions[:, ::-1])
+    done = demo('--recording', 'walk.csv', '-o', 'walk.svg')
+    assert done.returncode == 0, done.stderr
+    assert f'messages in   50  in {times[-1] - times[0]:.2f} s' in done.stdout
+    assert re.search(r'poses out +100 ', done.stdout)
+    assert Path('walk.svg').is_file()
+
+
+def test_recorded_robot_can_be_played():
+    recording = Path(__file__).parents[2] / 'shared/data/icub_genova04_walking.csv'
+    if not recording.is_file():
+        pytest.skip(f'no {recording}')
+    done = demo('--recording', str(recording), '--seconds', '2')
+    assert done.returncode == 0, done.stderr
+    assert re.search(r'lost +none', done.stdout)
+
+
+@pytest.mark.parametrize(('version', 'foot_frame'), [('v1', 'dh'), ('v2_5', 'sole')])
+def test_poses_received_are_those_of_the_chains(monkeypatch, version, foot_frame):
+    """In the order of the messages, equal to the plain product of the DH matrices."""
+    monkeypatch.setenv('ROS_DOMAIN_ID', '45')
+    catalog = Catalog.load()
+    gait = walk(catalog, version, seconds=0.5)
+    with Replay(gait, '/leg_fk_test', TIPS) as replay, \
+            NodeProcess('/leg_fk_test', {'version': version, 'foot_frame': foot_frame}) as node:
+        replay.wait_for_node(node.check)
+        replay.play(lambda elapsed: None, 0.1, node.check)
+    for answers, name, q in zip(replay.answers, ('left_leg', 'right_leg'),
+                                np.hsplit(gait.positions, 2)):
+        T = np.array([catalog.chain(name, version, foot_frame).forward(row) for row in q])
+        assert answers.arrived == len(gait.times)
+        assert answers.unasked == 0
+        assert np.abs(answers.poses[:, :3] - T[:, :3, 3]).max() < 1e-12
+        assert (answers.latencies > 0).all()
+
+
+def test_lost_poses_are_told_and_exit_1(capsys):
+    recording = walk(Catalog.load(), 'v2_5', seconds=0.1)
+    answers = [Answers(tip, np.zeros((10, 7)), np.full(10, 1e-3)) for tip in TIPS]
+    answers[1].latencies[3:5] = np.nan
+    assert conclude(recording, answers, Path('demo.png')) == 1
+    captured = capsys.readouterr()
+    assert re.search(r'poses out +18 +\(left_foot 10, right_foot 8\)\nlost +2\n', captured.out)
+    assert captured.err.count('\n') == 1
+    assert '2 did not arrive' in captured.err
+
+
+def test_node_that_refuses_its_parameters_is_one_line():
+    with pytest.raises(NodeError, match=r'exit status 1: .*v9.*v2_5'), \
+            NodeProcess('/leg_fk_test', {'version': 'v9'}) as node:
+        wait_until(lambda: node.check())
+
+
+def test_node_that_dies_is_one_line_and_exit_1():
+    process = subprocess.Popen([*DEMO, '--seconds', '60'], stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, text=True)
+    node, = wait_until(lambda: children(process.pid))
+    read_until(process.stdout, 'right foot: x')
+    os.kill(node, signal.SIGKILL)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 1
+    assert err.count('\n') == 1
+    assert 'the node stopped with exit status -9' in err
+
+
+def read_until(stream, text):
+    for line in stream:
+        if text in line:
+            return
+    raise AssertionError(f'no {text!r}')
+
+
+@pytest.mark.parametrize(('number', 'status', 'early'), [
+    (signal.SIGINT, 130, True), (signal.SIGINT, 130, False), (signal.SIGTERM, 143, True),
+    (signal.SIGTERM, 143, False), (signal.SIGHUP, 129, False)])
+def test_signals_leave_no_process_behind(number, status, early):
+    process = subprocess.Popen([*DEMO, '--seconds', '60'], stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, text=True)
+    node, = wait_until(lambda: children(process.pid))
+    if not early:
+        read_until(process.stdout, 'right foot: x')
+    process.send_signal(number)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == status
+    assert err == ''
+    wait_until(lambda: not runs(node), timeout=1.0)
+
+
+def on_a_terminal(*words, **environment):
+    """Return what the demonstration writes on a terminal of 100 by 40."""
+    controller, terminal = pty.openpty()
+    process = subprocess.Popen(
+        [*DEMO, *words], stdin=terminal, stdout=terminal, stderr=terminal,
+        env={**os.environ, 'TERM': 'xterm-256color', 'COLUMNS': '100', 'LINES': '40',
+             'PYTHONIOENCODING': 'utf-8', **environment})
+    os.close(terminal)
+    written = b''
+    while select.select([controller], [], [], 60)[0]:
+        try:
+            data = os.read(controller, 65536)
+        except OSError:  # the other end is closed
+            break
+        written += data
+    os.close(controller)
+    assert process.wait(30) == 0
+    return written.decode()
+
+
+def test_on_a_terminal_the_table_is_redrawn_in_place():
+    text = on_a_terminal('--seconds', '2')
+    frames = re.split(r'\x1b\[\d+A', text)
+    assert 10 <= len(frames) <= 25  # 10 a second
+    rows = set(re.findall(r'left foot +(-?\d.*\d)', text))
+    assert len(rows) >= 10  # it moves
+    assert '\x1b[38;5;' in text
+    assert text.index('\x1b[?25l') < text.index('\x1b[?25h') < text.index('messages in')
+    for line in re.sub(r'\x1b\[[\d;?]*[A-Za-z]', '', text).splitlines():
+        assert len(line) < 100
+
+
+def test_no_color_is_respected():
+    text = on_a_terminal('--seconds', '0.5', NO_COLOR='1')
+    assert '\x1b[2K' in text
+    assert not re.search(r'\x1b\[[\d;]*m', text)
+
+
+@pytest.mark.parametrize(('words', 'named'), [
+    (['--version', 'v9'], ['v9', 'v2_5']),
+    (['--foot-frame', 'toe'], ['toe', 'sole']),
+    (['--seconds', '0'], ['--seconds', '0.1']),
+    (['--rate', 'fast'], ['--rate', 'fast']),
+    (['-o', 'demo.gif'], ['.gif', '.png']),
+    (['--recording', 'no.csv'], ['no.csv']),
+    (['--recording', 'bad.csv'], ['bad.csv:3', 'column r_knee', "'nan'"]),
+    (['--recording', 'bad.csv', '--rate', '10'], ['--rate', '--recording']),
+])
+def test_bad_input_is_one_line_and_exit_2(capsys, words, named):
+    names = [name for leg in ('left_leg', 'right_leg')
+             for name in Catalog.load().entry(leg).joint_names]
+    file = write_csv(Path('bad.csv'), [0.0, 0.1], names, np.zeros((2, 12)))
+    lines = file.read_text().splitlines()
+    cells = lines[2].split(',')
+    cells[lines[0].split(',').index('r_knee')] = 'nan'
+    file.write_text('\n'.join([*lines[:2], ','.join(cells)]))
+    assert main(['demo', *words]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.count('\n') == 1
+    for word in named:
+        assert word in captured.err
+    assert not Path('demo.png').exists()
+
+
+@pytest.mark.parametrize('library', ['rclpy', 'matplotlib'])
+def test_missing_library_is_one_line(library):
+    code = (f'import sys; sys.modules[{library!r}] = None\n'
+            'from icub_leg_fk.tools.leg_fk import main\n'
+            "sys.exit(main(['demo', '--seconds', '0.2']))")
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
+                          check=False, timeout=60)
+    assert done.returncode == 2
+    assert done.stderr.count('\n') == 1
+    assert library in done.stderr
