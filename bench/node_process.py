@@ -1,0 +1,138 @@
+"""A node under test, in its own process and namespace, and one stretch of messages through it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import subprocess
+import sys
+import time
+from typing import NamedTuple
+
+from bench.load import Process, Received
+from bench.measure import cpu_ns, resident_bytes
+
+TIPS = ('left_foot', 'right_foot')
+DEPTH = 1000
+
+
+class Stretch(NamedTuple):
+    """What some messages through a node have shown.
+
+    Attributes:
+        cpu: CPU time per message [us].
+        latencies: message sent to pose received, of all poses in order of arrival [us]; empty if
+            poses were lost.
+        lost: poses that did not arrive.
+        in_order: whether each pose carried its message's stamp, in the order of sending.
+    """
+
+    cpu: float
+    latencies: list[float]
+    lost: int
+    in_order: bool
+
+
+class NodeProcess:
+    """Starts a node in a namespace and takes it down.
+
+    Args:
+        namespace: the namespace, which also tells runs of the same node apart.
+        name: `ours`, or the name of a reference node.
+        tips: the topics that the observer shall subscribe to.
+        parameters: parameters of ours beside the QoS.
+    """
+
+    def __init__(self, namespace: str, name: str, tips: Sequence[str] = TIPS,
+                 parameters: Sequence[str] = ()) -> None:
+        self.joint_topic = f'/{namespace}/joint_states'
+        self.pose_topics = [f'/{namespace}/foot_pose_publisher/{tip}/pose' for tip in tips]
+        command = [sys.executable, '-m', 'bench.reference_nodes', name]
+        ros_arguments = ['--ros-args', '-r', f'__ns:=/{namespace}', '--log-level', 'warn']
+        if name == 'ours':
+            command = [sys.executable, '-m', 'icub_leg_fk.ros.main']
+            joints = f'qos_overrides.{self.joint_topic}.subscription'
+            for parameter in (*parameters, f'{joints}.reliability:=reliable',
+                              f'{joints}.depth:={DEPTH}',
+                              *(f'qos_overrides.{topic}.publisher.depth:={DEPTH}'
+                                for topic in self.pose_topics)):
+                ros_arguments += ['-p', parameter]
+        self.started = time.time_ns()
+        self._process = subprocess.Popen([*command, *ros_arguments])
+
+    def cpu_ns(self) -> int:
+        """Return the CPU time used so far [ns]."""
+        return cpu_ns(self._process.pid)
+
+    def resident_bytes(self) -> int:
+        """Return the resident size [bytes]."""
+        return resident_bytes(self._process.pid)
+
+    def close(self) -> None:
+        """End the process."""
+        self._process.terminate()
+        self._process.wait()
+
+
+class Bench:
+    """A robot and an observer around the nodes under test."""
+
+    def __init__(self) -> None:
+        from bench.load import observer, robot
+        self._robot = Process(robot)
+        self._observer = Process(observer)
+
+    def close(self) -> None:
+        """End both processes."""
+        self._robot.close()
+        self._observer.close()
+
+    def watch(self, node: NodeProcess) -> None:
+        """Subscribe to a node's poses."""
+        for topic in node.pose_topics:
+            self._observer('watch', topic)
+
+    def match(self, node: NodeProcess) -> None:
+        """Wait until messages reach a node and its poses reach the observer."""
+        if not self._robot('match', node.joint_topic):
+            raise RuntimeError(f'no node has subscribed to {node.joint_topic}')
+        for _ in range(100):
+            self._robot('send', node.joint_topic, 32, 100.0, 5)
+            if all(self._observer('take', topic, 1 << 30).stamps for topic in node.pose_topics):
+                return
+        raise RuntimeError(f'no poses from {node.pose_topics}')
+
+    def forget(self, node: NodeProcess) -> None:
+        """Take down all that was made for a node."""
+        for topic in node.pose_topics:
+            self._observer('drop', topic)
+        self._robot('close', node.joint_topic)
+
+    def start_to_first_pose(self, node: NodeProcess) -> float:
+        """Return the time from a node's start to its first pose [s]; call it at once."""
+        self.watch(node)
+        self._robot.send('send_until_told', node.joint_topic, 32, 200.0)
+        first = self._observer('first', node.pose_topics[0])
+        self._robot('stop', '')
+        if first is None:
+            raise RuntimeError(f'no pose from {node.pose_topics[0]}')
+        for topic in node.pose_topics:
+            self._observer('take', topic, 1 << 30)
+        return float((first - node.started) / 1e9)
+
+    def stretch(self, node: NodeProcess, joints: int, rate: float, count: int) -> Stretch:
+        """Send messages through a node and return what was seen of them."""
+        before = node.cpu_ns()
+        sent = self._robot('send', node.joint_topic, joints, rate, count)
+        received = [self._observer('take', topic, count) for topic in node.pose_topics]
+        cpu = (node.cpu_ns() - before) / 1000 / count
+        return Stretch(cpu, _latencies(sent, received),
+                       sum(count - len(topic.arrivals) for topic in received),
+                       all(topic.stamps == sent for topic in received))
+
+
+def _latencies(sent: list[int], received: list[Received]) -> list[float]:
+    """Pair messages and poses by their order, for ready-made poses carry no stamp of theirs."""
+    if any(len(topic.arrivals) != len(sent) for topic in received):
+        return []
+    return [(arrival - stamp) / 1000 for topic in received
+            for stamp, arrival in zip(sent, topic.arrivals, strict=True)]

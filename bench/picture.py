@@ -1,0 +1,58 @@
+"""How the cost grows, as a picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from bench.report import Report
+
+_COLOURS = {'ours': '#1f6fb4', 'floor': '#8a8a8a', 'plain': '#c8553d'}
+_LABELS = {
+    'ours': 'foot_pose_publisher', 'floor': 'floor: no kinematics', 'plain': 'plain rclpy, numpy'}
+_BAG_LABELS = {'ours': 'leg_fk bag', 'plain': 'plain rosbags loop'}
+_PANELS = {
+    'joints': ('Joints per message, 1 kHz', 'joints', 'CPU per message [µs]', ''),
+    'chains': ('Chains, 32 joints, 1 kHz', 'chains', 'CPU per message [µs]', ''),
+    'rate': ('Rate, 32 joints, as far as it keeps up', 'messages per second [Hz]',
+             'CPU per message [µs]', 'x'),
+    'bag': ('Bag at 1 kHz, 32 joints', 'seconds recorded [s]', 'seconds taken [s]', 'xy'),
+}
+
+
+def draw(report: Report, path: Path) -> None:
+    """Save the growth curves: medians, with the spread as a band."""
+    import matplotlib
+    matplotlib.use('Agg')
+    from matplotlib import pyplot as plt
+    plt.rcParams.update({'font.size': 9, 'axes.spines.top': False, 'axes.spines.right': False})
+    panels = [panel for panel in _PANELS if panel in report.growth]
+    fig, all_axes = plt.subplots(1, len(panels), figsize=(3.6 * len(panels), 3.3),
+                                 squeeze=False, layout='constrained')
+    for axes, panel in zip(all_axes[0], panels):
+        title, xlabel, ylabel, log = _PANELS[panel]
+        axes.set_title(title, fontsize=9, loc='left')
+        axes.set_xlabel(xlabel)
+        axes.set_ylabel(ylabel)
+        labels = _BAG_LABELS if panel == 'bag' else _LABELS
+        for name in (name for name in _COLOURS if name in report.growth[panel]):
+            points = report.growth[panel][name]
+            x = [at for at, _ in points]
+            axes.plot(x, [value.median for _, value in points], 'o-', markersize=3.5,
+                      color=_COLOURS[name], label=labels[name])
+            axes.fill_between(x, [value.low for _, value in points],
+                              [value.high for _, value in points],
+                              color=_COLOURS[name], alpha=0.2, linewidth=0)
+        if 'x' in log:
+            axes.set_xscale('log')
+        if 'y' in log:
+            axes.set_yscale('log')
+        else:
+            axes.set_ylim(bottom=0)
+        if panel == 'chains':
+            axes.set_xticks([1, 2, 3])
+        axes.grid(alpha=0.25, linewidth=0.6)
+        axes.legend(frameon=False, fontsize=8)
+    fig.suptitle(report.machine, fontsize=8, color='#666666', x=0.01, ha='left')
+    path.parent.mkdir(parents=True, exist_ok=True)
+    fig.savefig(path, dpi=150)
+    plt.close(fig)

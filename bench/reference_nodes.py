@@ -1,0 +1,166 @@
+"""The nodes that foot_pose_publisher is measured against: `python -m bench.reference_nodes NAME`.
+
+`bare` and `plain` are written as the rclpy tutorials show it: SingleThreadedExecutor and message
+objects. `floor` does the least that any Python node must do that answers a JointState with two
+PoseStamped. `dds`, `receive` and `decode` are the steps to the floor and from there to ours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+import signal
+import sys
+import time
+from typing import Any
+
+from geometry_msgs.msg import PoseStamped
+import numpy as np
+import rclpy
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
+
+DEPTH = 1000  # messages; every node has it in and out, so that a stall of the machine loses none
+QOS = QoSProfile(depth=DEPTH)
+TIPS = ('left_foot', 'right_foot')
+
+
+def dds(node: Node) -> None:
+    """Let the middleware receive, and never look."""
+    node.create_subscription(JointState, 'joint_states', lambda message: None, QOS, raw=True)
+    while rclpy.ok():
+        time.sleep(0.25)
+
+
+def receive(node: Node) -> None:
+    """Receive bytes and drop them."""
+    _spin_events(node, lambda data: None)
+
+
+def floor(node: Node) -> None:
+    """Receive bytes, send two ready-made byte strings."""
+    (left, left_bytes), (right, right_bytes) = _ready_made(node)
+
+    def relay(data: bytes) -> None:
+        left(left_bytes)
+        right(right_bytes)
+    _spin_events(node, relay)
+
+
+def decode(node: Node) -> None:
+    """Receive bytes, make joint vectors of them by the rules, send ready-made bytes."""
+    from icub_leg_fk.kinematics import Catalog
+    from icub_leg_fk.ros.joint_input import JointInput
+    from icub_leg_fk.ros.joint_stream import JointStream
+    catalog = Catalog.load(None)
+    chains = [catalog.chain(name, 'v2_5', 'dh') for name in ('left_leg', 'right_leg')]
+    stream = JointStream(JointInput(chains, 0.5), time.time_ns)
+
+    def sender(send: Callable[[bytes], None], data: bytes) -> Callable[..., None]:
+        return lambda sec, nanosec, q, qdot: send(data)
+    stream.on_ready = [sender(*ready) for ready in _ready_made(node)]
+    _spin_events(node, stream.feed)
+
+
+def bare(node: Node) -> None:
+    """Receive messages and relay their stamps."""
+    publishers = _publishers(node)
+
+    def relay(message: JointState) -> None:
+        for publisher in publishers:
+            pose = PoseStamped()
+            pose.header.stamp = message.header.stamp
+            publisher.publish(pose)
+    node.create_subscription(JointState, 'joint_states', relay, QOS)
+    rclpy.spin(node)
+
+
+def plain(node: Node) -> None:
+    """Compute with numpy, 4x4 matrix by 4x4 matrix."""
+    from icub_leg_fk.kinematics import Catalog
+    catalog = Catalog.load(None)
+    chains = [catalog.chain(name, 'v2_5', 'dh') for name in ('left_leg', 'right_leg')]
+    publishers = _publishers(node)
+
+    def publish_poses(message: JointState) -> None:
+        positions = dict(zip(message.name, message.position))
+        for chain, publisher in zip(chains, publishers):
+            T = chain.T_root_0
+            for name, link in zip(chain.joint_names, chain.links):
+                T = T @ dh_transform(link.a, link.d, link.alpha, link.offset + positions[name])
+            pose = PoseStamped()
+            pose.header.stamp = message.header.stamp
+            pose.header.frame_id = chain.root_frame
+            pose.pose.position.x, pose.pose.position.y, pose.pose.position.z = T[:3, 3].tolist()
+            (pose.pose.orientation.x, pose.pose.orientation.y, pose.pose.orientation.z,
+             pose.pose.orientation.w) = quaternion(T)
+            publisher.publish(pose)
+    node.create_subscription(JointState, 'joint_states', publish_poses, QOS)
+    rclpy.spin(node)
+
+
+def dh_transform(a: float, d: float, alpha: float, theta: float) -> Any:
+    """Return the (4, 4) matrix of a row of a DH table [m, rad]."""
+    ct, st, ca, sa = math.cos(theta), math.sin(theta), math.cos(alpha), math.sin(alpha)
+    return np.array([[ct, -st * ca, st * sa, a * ct],
+                     [st, ct * ca, -ct * sa, a * st],
+                     [0.0, sa, ca, d],
+                     [0.0, 0.0, 0.0, 1.0]])
+
+
+def quaternion(T: Any) -> tuple[float, float, float, float]:
+    """Return x, y, z, w of the rotation in a (4, 4) matrix, by the largest of the four."""
+    m = T.tolist()
+    w = 1.0 + m[0][0] + m[1][1] + m[2][2]
+    x = 1.0 + m[0][0] - m[1][1] - m[2][2]
+    y = 1.0 - m[0][0] + m[1][1] - m[2][2]
+    z = 1.0 - m[0][0] - m[1][1] + m[2][2]
+    wx, wy, wz = m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]
+    xy, xz, yz = m[0][1] + m[1][0], m[0][2] + m[2][0], m[1][2] + m[2][1]
+    largest = max(w, x, y, z)
+    scale = math.copysign(0.5 / math.sqrt(largest), w if largest == w else 1.0)
+    if largest == w:
+        q = (wx * scale, wy * scale, wz * scale, w * scale)
+    elif largest == x:
+        q = (x * scale, xy * scale, xz * scale, wx * scale)
+    elif largest == y:
+        q = (xy * scale, y * scale, yz * scale, wy * scale)
+    else:
+        q = (xz * scale, yz * scale, z * scale, wz * scale)
+    return q if q[3] >= 0.0 else (-q[0], -q[1], -q[2], -q[3])
+
+
+def _publishers(node: Node) -> list[Any]:
+    return [node.create_publisher(PoseStamped, f'~/{tip}/pose', QOS) for tip in TIPS]
+
+
+def _ready_made(node: Node) -> list[tuple[Callable[[bytes], None], bytes]]:
+    pose = PoseStamped()
+    pose.header.frame_id = 'root_link'
+    data = serialize_message(pose)
+    return [(publisher.publish, data) for publisher in _publishers(node)]
+
+
+def _spin_events(node: Node, on_message: Callable[[bytes], None]) -> None:
+    from rclpy.experimental.events_executor import EventsExecutor
+    node.create_subscription(JointState, 'joint_states', on_message, QOS, raw=True)
+    executor = EventsExecutor()
+    executor.add_node(node)
+    while rclpy.ok():
+        executor.spin_once(timeout_sec=0.25)
+
+
+NODES = {node.__name__: node for node in (bare, plain, dds, receive, floor, decode)}
+
+
+def main() -> None:
+    """Run the node that the first argument names until SIGTERM."""
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    rclpy.init(args=sys.argv, signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
+    NODES[sys.argv[1]](Node('foot_pose_publisher'))
+
+
+if __name__ == '__main__':
+    main()
