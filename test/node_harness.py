@@ -167,6 +167,7 @@ class Robot:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._name = name
+        self._name_in_status = f'{node.namespace}/{name}'.lstrip('/')
         self.joints = self.node.create_publisher(JointState, 'joint_states', DEEP)
         self.poses = {tip: self.listen(PoseStamped, f'{name}/{tip}/pose') for tip in tips}
         self.left, self.right = (self.poses.get(tip) for tip in FEET)
@@ -256,17 +257,27 @@ class Robot:
         """Return an inbox of /diagnostics."""
         return self.listen(DiagnosticArray, '/diagnostics')
 
-    def status(self, inbox, chain, condition, what):
-        """Wait for a status of a chain that meets a condition; return it and its values."""
-        found = []
+    def status(self, inbox, chain, condition, meanwhile=lambda: None):
+        """Wait for a status of a chain that meets a condition; return it and its values.
+
+        Args:
+            inbox: inbox of /diagnostics.
+            chain: name of the chain.
+            condition: function of the status and its dictionary of values.
+            meanwhile: called again and again while waiting, such as to send joint states.
+        """
+        found, seen = [], []
 
         def arrived():
+            meanwhile()
             for array in inbox:
                 for status in array.status:
                     values = {item.key: item.value for item in status.values}
-                    if status.name.endswith(f': {chain}') and condition(status, values):
-                        found.append((status, values))
+                    if status.name == f'{self._name_in_status}: {chain}':
+                        seen[:] = [(status.level, status.message, values)]
+                        if condition(status, values):
+                            found.append((status, values))
             inbox.clear()
             return bool(found)
-        self.until(arrived, what)
+        self.until(arrived, seen)
         return found[0]
