@@ -191,7 +191,7 @@ class Chain:
         shape = f'({n},)' if ndim == 1 else f'(N, {n})'
         try:
             values = np.asarray(q, dtype=float)
-        except (TypeError, ValueError) as error:
+        except (OverflowError, TypeError, ValueError) as error:
             msg = f'joint vector: found a {type(q).__name__}, allowed: {shape} numbers'
             raise JointVectorError(msg) from error
         if values.ndim != ndim or values.shape[-1] != n:

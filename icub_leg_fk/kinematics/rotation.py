@@ -106,9 +106,9 @@ def is_rigid_transform(T: Array, tolerance: float = 1e-6) -> bool:
 def nearest_rotation(R: Array) -> Array:
     """Return the rotation nearest to a (3, 3) matrix that was rounded when it was written down.
 
-    A matrix that is a rotation to the last digit, as of right angles, comes back untouched.
+    A matrix that is a rotation to the last digits of a float comes back untouched.
     """
-    if np.array_equal(R @ R.T, np.eye(3)):
+    if np.allclose(R @ R.T, np.eye(3), rtol=0.0, atol=1e-14):
         return R
     U, _, Vt = np.linalg.svd(R)
     return np.asarray(U @ Vt)

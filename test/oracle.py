@@ -1,0 +1,163 @@
+"""Answers this project did not compute: the printed tables in Pinocchio, in PyKDL, and by hand.
+
+The numbers are typed in from the documents, and each model is put together from rotations and
+translations about the axes; nothing here is shared with the code under test.
+"""
+
+from collections.abc import Sequence
+from math import cos, pi, sin
+from typing import Any
+
+from icub_leg_fk.kinematics import Chain
+import numpy as np
+
+# (a [mm], d [mm], alpha [rad], offset [deg]), a row per link, as printed.
+Row = tuple[float, float, float, float]
+
+LEFT_V1: list[Row] = [
+    (0, 0, -pi / 2, 90), (0, 0, -pi / 2, 90), (0, -223.6, pi / 2, -90),
+    (-213, 0, pi, 90), (0, 0, -pi / 2, 0), (-41, 0, 0, 0)]
+RIGHT_V1: list[Row] = [
+    (0, 0, pi / 2, 90), (0, 0, pi / 2, 90), (0, 223.6, -pi / 2, -90),
+    (-213, 0, pi, 90), (0, 0, pi / 2, 0), (-41, 0, pi, 0)]
+LEFT_V2_5: list[Row] = [
+    (0, 0, -pi / 2, 90), (0, 0, -pi / 2, 90), (-0.9175, -234.545, pi / 2, -90),
+    (-200.5, 0, pi, 90), (0, 0, -pi / 2, 0), (-68.05, -3.5, 0, 0)]
+RIGHT_V2_5: list[Row] = [
+    (0, 0, pi / 2, 90), (0, 0, pi / 2, 90), (-0.9175, 234.545, -pi / 2, -90),
+    (-200.5, 0, pi, 90), (0, 0, pi / 2, 0), (-68.05, 3.5, pi, 0)]
+# Of iKin, not of the documents.
+LEFT_V3: list[Row] = [
+    (9, 0, -pi / 2, 90), (-15, -10.6, -pi / 2, 90), (15, -266.8, pi / 2, -90),
+    (-255.988, 6.2, pi, 90), (-35, 0, -pi / 2, 0), (-53.2, 0, 0, 0)]
+RIGHT_V3: list[Row] = [
+    (9, 0, pi / 2, 90), (-15, 10.6, pi / 2, 90), (15, 266.8, -pi / 2, -90),
+    (-255.988, 6.2, pi, 90), (-35, 0, pi / 2, 0), (-53.2, 0, pi, 0)]
+HEAD_V2: list[Row] = [
+    (32, 0, pi / 2, 0), (0, -5.5, pi / 2, -90), (0, -223.3, -pi / 2, -90),
+    (9.5, 0, pi / 2, 90), (0, 0, -pi / 2, -90), (18.5, 110.8, -pi / 2, 90)]
+
+
+def _leg_root(x: float, y: float, z: float) -> np.ndarray:
+    return np.array([[1, 0, 0, x / 1000], [0, 0, 1, y / 1000], [0, -1, 0, z / 1000], [0, 0, 0, 1]])
+
+
+HEAD_ROOT = np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
+T_NIS = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0.0066], [0, 0, 0, 1]])
+SOLE = np.array([[0.0, 0, 1, 0], [0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
+
+# (chain, version): root transform, rows, transform from the tip to the last frame.
+TABLES: dict[tuple[str, str], tuple[np.ndarray, list[Row], np.ndarray]] = {
+    ('left_leg', 'v1'): (_leg_root(0, -68.1, -119.9), LEFT_V1, np.eye(4)),
+    ('left_leg', 'v2_5'): (_leg_root(0, -68.1, -119.9), LEFT_V2_5, np.eye(4)),
+    ('left_leg', 'v3'): (_leg_root(-21.6, -73.65, -60.5), LEFT_V3, np.eye(4)),
+    ('right_leg', 'v1'): (_leg_root(0, 68.1, -119.9), RIGHT_V1, np.eye(4)),
+    ('right_leg', 'v2_5'): (_leg_root(0, 68.1, -119.9), RIGHT_V2_5, np.eye(4)),
+    ('right_leg', 'v3'): (_leg_root(-21.6, 73.65, -60.5), RIGHT_V3, np.eye(4)),
+    ('head_imu', 'v2'): (HEAD_ROOT, HEAD_V2, T_NIS),
+}
+CASES = [(name, version, frame) for name, version in TABLES
+         for frame in (('dh', 'sole') if name != 'head_imu' else ('dh',))]
+
+
+class PinocchioArm:
+    """A printed table as a Pinocchio model: joints about z at fixed placements."""
+
+    def __init__(self, name: str, version: str, frame: str) -> None:
+        import pinocchio as pin
+
+        T_root_0, rows, T_n_tip = TABLES[name, version]
+        self.pin, self.model = pin, pin.Model()
+        placement, joint = pin.SE3(T_root_0), 0
+        for i, (a, d, alpha, offset) in enumerate(rows):
+            placement = placement * pin.SE3(pin.utils.rotate('z', np.deg2rad(offset)), np.zeros(3))
+            joint = self.model.addJoint(joint, pin.JointModelRZ(), placement, f'joint_{i}')
+            along_z = pin.SE3(np.eye(3), np.array([0, 0, d / 1000]))
+            along_x = pin.SE3(np.eye(3), np.array([a / 1000, 0, 0]))
+            placement = along_z * along_x * pin.SE3(pin.utils.rotate('x', alpha), np.zeros(3))
+        placement = placement * pin.SE3(T_n_tip @ (SOLE if frame == 'sole' else np.eye(4)))
+        self.tip = self.model.addFrame(
+            pin.Frame('tip', joint, placement, pin.FrameType.OP_FRAME))
+        self.data = self.model.createData()
+
+    def forward(self, q: np.ndarray) -> np.ndarray:
+        self.pin.framesForwardKinematics(self.model, self.data, q)
+        return np.array(self.data.oMf[self.tip].homogeneous)
+
+    def jacobian(self, q: np.ndarray) -> np.ndarray:
+        return np.array(self.pin.computeFrameJacobian(
+            self.model, self.data, q, self.tip, self.pin.ReferenceFrame.LOCAL_WORLD_ALIGNED))
+
+
+class KDLArm:
+    """A printed table as a PyKDL chain of its own Denavit-Hartenberg frames."""
+
+    def __init__(self, name: str, version: str, frame: str) -> None:
+        import PyKDL as kdl
+
+        T_root_0, rows, T_n_tip = TABLES[name, version]
+        self.kdl, self.chain = kdl, kdl.Chain()
+        fixed = kdl.Joint(getattr(kdl.Joint, 'Fixed', None) or getattr(kdl.Joint, 'None'))
+        self.chain.addSegment(kdl.Segment(fixed, self._frame(T_root_0)))
+        for a, d, alpha, offset in rows:
+            link = kdl.Frame.DH(a / 1000, alpha, d / 1000, np.deg2rad(offset))
+            self.chain.addSegment(kdl.Segment(kdl.Joint(kdl.Joint.RotZ), link))
+        T = T_n_tip @ (SOLE if frame == 'sole' else np.eye(4))
+        self.chain.addSegment(kdl.Segment(fixed, self._frame(T)))
+        self.solver = kdl.ChainFkSolverPos_recursive(self.chain)
+
+    def _frame(self, T: np.ndarray) -> Any:
+        rotation = self.kdl.Rotation(*T[:3, :3].ravel().tolist())
+        return self.kdl.Frame(rotation, self.kdl.Vector(*T[:3, 3].tolist()))
+
+    def forward(self, q: np.ndarray) -> np.ndarray:
+        joints, frame = self.kdl.JntArray(len(q)), self.kdl.Frame()
+        for i, position in enumerate(q):
+            joints[i] = position
+        assert self.solver.JntToCart(joints, frame) >= 0
+        return np.array([[frame[i, j] for j in range(4)] for i in range(3)] + [[0, 0, 0, 1]])
+
+
+def translation(x: float, y: float, z: float) -> np.ndarray:
+    return np.array([[1, 0, 0, x], [0, 1, 0, y], [0, 0, 1, z], [0, 0, 0, 1.0]])
+
+
+def rotation_x(angle: float) -> np.ndarray:
+    c, s = cos(angle), sin(angle)
+    return np.array([[1, 0, 0, 0], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1]])
+
+
+def rotation_z(angle: float) -> np.ndarray:
+    c, s = cos(angle), sin(angle)
+    return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+
+
+def basic_product(a: float, d: float, alpha: float, theta: float) -> np.ndarray:
+    """Return one link, as the documents define it: Rz(theta) Tz(d) Tx(a) Rx(alpha)."""
+    return rotation_z(theta) @ translation(0, 0, d) @ translation(a, 0, 0) @ rotation_x(alpha)
+
+
+class HandMadeArm:
+    """A printed table multiplied out, where neither of the libraries is installed."""
+
+    def __init__(self, name: str, version: str, frame: str) -> None:
+        self.T_root_0, self.rows, self.T_n_tip = TABLES[name, version]
+        self.T_dh_tip = SOLE if frame == 'sole' else np.eye(4)
+
+    def forward(self, q: np.ndarray) -> np.ndarray:
+        T = self.T_root_0
+        for (a, d, alpha, offset), position in zip(self.rows, q, strict=True):
+            T = T @ basic_product(a / 1000, d / 1000, alpha, np.deg2rad(offset) + position)
+        return T @ self.T_n_tip @ self.T_dh_tip
+
+
+def product(chain: Chain, q: Sequence[float]) -> np.ndarray:
+    """Return T_root_tip of any chain, each link as the product of its four basic transforms."""
+    T = np.array(chain.T_root_0)
+    for link, position in zip(chain.links, q, strict=True):
+        turn, slide = (0.0, position) if link.joint_type == 'prismatic' else (position, 0.0)
+        T = T @ basic_product(link.a, link.d + slide, link.alpha, link.offset + turn)
+    if chain.virtual_link is not None:
+        link = chain.virtual_link
+        T = T @ basic_product(link.a, link.d, link.alpha, link.offset)
+    return T @ chain.T_n_tip

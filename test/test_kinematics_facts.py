@@ -1,0 +1,105 @@
+"""What is known of the documented chains without computing: zeros, mirrors, axes, frames."""
+
+from icub_leg_fk.kinematics import Catalog, Chain, DHLink, quaternion_to_matrix
+import numpy as np
+import pytest
+
+CATALOG = Catalog.load()
+MIRROR = np.diag([1.0, -1.0, 1.0])  # left and right, in the root frame
+
+
+@pytest.mark.parametrize(('name', 'version', 'position_mm'), [
+    ('left_leg', 'v1', (0, -68.1, -597.5)),
+    ('right_leg', 'v1', (0, 68.1, -597.5)),
+    ('left_leg', 'v2_5', (4.4175, -68.1, -622.995)),
+    ('right_leg', 'v2_5', (4.4175, 68.1, -622.995)),
+])
+def test_foot_at_zero_is_where_it_is_known_to_be(
+        name: str, version: str, position_mm: tuple[float, float, float]) -> None:
+    chain = CATALOG.chain(name, version)
+    T = chain.forward([0] * 6)
+    assert T[:3, 3] * 1000 == pytest.approx(position_mm, abs=1e-10)
+    assert np.array_equal(T[:3, :3], [[0, 0, -1], [0, 1, 0], [1, 0, 0]])
+    assert chain.pose([0.0] * 6) == pytest.approx(
+        (*np.array(position_mm) / 1000, 0, -np.sqrt(0.5), 0, np.sqrt(0.5)), abs=1e-13)
+
+
+def test_head_sensor_at_zero_is_where_it_is_known_to_be() -> None:
+    T = CATALOG.chain('head_imu', 'v2').forward([0] * 6)
+    assert T[:3, 3] * 1000 == pytest.approx((13.0, 6.6, 375.6), abs=1e-10)
+    assert np.array_equal(T[:3, :3], np.eye(3))
+
+
+@pytest.mark.parametrize('version', ['v1', 'v2_5'])
+def test_right_foot_mirrors_left_foot(version: str) -> None:
+    left, right = CATALOG.chain('left_leg', version), CATALOG.chain('right_leg', version)
+    for q in np.random.default_rng(3).uniform(-3, 3, (1000, 6)):
+        T_left, T_right = left.forward(q), right.forward(q)
+        assert T_right[:3, 3] == pytest.approx(MIRROR @ T_left[:3, 3], abs=1e-14)
+        assert T_right[:3, :3] == pytest.approx(MIRROR @ T_left[:3, :3] @ MIRROR, abs=1e-14)
+
+
+def test_version_3_legs_differ_from_their_mirror_image_by_12_4_mm() -> None:
+    left, right = CATALOG.chain('left_leg', 'v3'), CATALOG.chain('right_leg', 'v3')
+    for q in np.random.default_rng(4).uniform(-3, 3, (100, 6)):
+        off = right.forward(q)[:3, 3] - MIRROR @ left.forward(q)[:3, 3]
+        assert np.linalg.norm(off) == pytest.approx(0.0124, abs=1e-12)
+
+
+@pytest.mark.parametrize('name', ['left_leg', 'right_leg'])
+def test_sole_points_forward_left_and_up_when_standing(name: str) -> None:
+    for version in CATALOG.chains[name].versions:
+        T = CATALOG.chain(name, version, 'sole').forward([0] * 6)
+        # The root frame's x points backward and its y to the robot's right.
+        assert np.array_equal(T[:3, :3].T, [[-1, 0, 0], [0, -1, 0], [0, 0, 1]])
+
+
+@pytest.mark.parametrize('name', ['left_leg', 'right_leg'])
+def test_sole_is_the_dh_frame_turned_by_the_documented_quaternion(name: str) -> None:
+    dh, sole = CATALOG.chain(name, 'v2_5'), CATALOG.chain(name, 'v2_5', 'sole')
+    for q in np.random.default_rng(5).uniform(-1, 1, (20, 6)):
+        turn = dh.forward(q)[:3, :3].T @ sole.forward(q)[:3, :3]
+        documented = quaternion_to_matrix((np.sqrt(0.5), 0, np.sqrt(0.5), 0))
+        assert turn == pytest.approx(documented, abs=1e-15)
+        assert np.array_equal(dh.forward(q)[:3, 3], sole.forward(q)[:3, 3])
+
+
+def test_sensor_transform_equals_the_virtual_link() -> None:
+    head = CATALOG.chain('head_imu', 'v2')
+    last = DHLink(a=0, d=0.0066, alpha=np.pi / 2)
+    virtual = Chain(
+        name='head', version='v2', root_frame='root', tip='imu', tip_frame='imu',
+        joint_names=head.joint_names, links=head.links, T_root_0=head.T_root_0, virtual_link=last)
+    assert not np.array_equal(head.T_n_tip, np.eye(4)) and head.virtual_link is None
+    for q in np.random.default_rng(6).uniform(-3, 3, (100, 6)):
+        assert np.array_equal(virtual.forward(q), head.forward(q))
+        assert virtual.pose(q.tolist()) == head.pose(q.tolist())
+
+
+def test_frames_begin_at_frame_0_and_end_at_the_tip() -> None:
+    chain = CATALOG.chain('head_imu', 'v2')
+    q = [0.1, -0.2, 0.3, -0.4, 0.5, -0.6]
+    frames = chain.frames(q)
+    assert frames.shape == (8, 4, 4)
+    assert np.array_equal(frames[0], chain.T_root_0)
+    assert np.array_equal(frames[-1], chain.forward(q))
+    assert frames[-1] == pytest.approx(frames[-2] @ chain.T_n_tip, abs=1e-16)
+
+
+def test_knee_and_ankle_keep_their_distance() -> None:
+    """The links of the printed table are as long as they say, however the leg is bent."""
+    chain = CATALOG.chain('left_leg', 'v1')
+    for q in np.random.default_rng(7).uniform(-1, 1, (20, 6)):
+        origins = chain.frames(q)[:, :3, 3]
+        assert np.linalg.norm(origins[3] - origins[0]) == pytest.approx(0.2236, abs=1e-15)
+        assert np.linalg.norm(origins[4] - origins[3]) == pytest.approx(0.213, abs=1e-15)
+        assert np.linalg.norm(origins[6] - origins[5]) == pytest.approx(0.041, abs=1e-15)
+
+
+def test_out_of_range_names_the_joints_and_clamps_nothing() -> None:
+    chain = CATALOG.chain('left_leg', 'v2_5')
+    within, outside = [0.0] * 6, [0.0, np.radians(30), 0.0, 0.1, 0.0, 0.0]
+    assert chain.out_of_range(within) == ()
+    assert chain.out_of_range(outside) == ('l_hip_roll', 'l_knee')
+    clamped = [0.0, np.radians(17), 0.0, 0.0, 0.0, 0.0]
+    assert np.linalg.norm(chain.forward(outside)[:3, 3] - chain.forward(clamped)[:3, 3]) > 0.1
