@@ -2,13 +2,12 @@
 
 import math
 from pathlib import Path
-import subprocess
-import sys
 from xml.etree import ElementTree as ET
 
 from icub_leg_fk.kinematics import Catalog
 from icub_leg_fk.tools.leg_fk import main
 from icub_leg_fk.tools.urdf_model import xyz_rpy
+from leg_fk_process import assert_one_line_complaint, leg_fk
 import numpy as np
 import pytest
 
@@ -116,7 +115,8 @@ def test_frames_and_joints_are_named_as_in_the_robots_own_urdf(write_urdf):
     links = {link.get('name') for link in robot.findall('link')}
     assert {'root_link', 'l_foot_dh_frame', 'l_sole', 'r_foot_dh_frame', 'r_sole',
             'imu_frame'} <= links
-    moving = {joint.get('name') for joint in robot.findall('joint') if joint.get('type') != 'fixed'}
+    moving = {joint.get('name') for joint in robot.findall('joint')
+              if joint.get('type') != 'fixed'}
     assert moving == {name for entry in Catalog.load().chains.values()
                       for name in entry.joint_names}
 
@@ -198,11 +198,7 @@ def broken(tmp_path, old, new):
     (['left_leg', '-o', '/no/such/folder/x.urdf'], 'No such file or directory'),
 ])
 def test_a_mistake_is_one_line_and_exit_2(words, complaint):
-    done = subprocess.run([sys.executable, '-m', 'icub_leg_fk.tools.leg_fk', 'urdf', *words],
-                          capture_output=True, text=True, timeout=60)
-    assert (done.returncode, done.stdout) == (2, '')
-    assert done.stderr.startswith('leg_fk: error: ') and complaint in done.stderr
-    assert done.stderr.count('\n') == 1
+    assert_one_line_complaint(leg_fk('urdf', *words), complaint)
 
 
 def test_a_slide_without_range_is_refused(tmp_path, capsys):

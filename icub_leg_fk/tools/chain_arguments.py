@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from icub_leg_fk.kinematics import Catalog, Chain
 
 DEFAULT_VERSION = 'v2_5'
+LARGEST = 1e9  # of a joint position; beyond it a float's last turn is lost anyway
 
 
 def add_kinematics_file(parser: argparse.ArgumentParser) -> None:
@@ -54,9 +55,9 @@ def _finite_number(text: str) -> float:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(
-            f'found {text.strip()!r}, allowed: finite numbers, one per joint')
+    if not abs(value) <= LARGEST:
+        raise argparse.ArgumentTypeError(f'found {text.strip()!r}, allowed: finite numbers up to '
+                                         f'{LARGEST:g}, one per joint')
     return value
 
 

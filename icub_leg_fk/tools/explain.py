@@ -11,7 +11,7 @@ from icub_leg_fk.tools.chain_arguments import (
     load_chain,
 )
 
-HELP = 'explain a chain: its DH table, each A_i, the running product, the answer'
+HELP = 'explain a chain: DH table, each A_i, products, answer'
 EXAMPLES = """\
 Without joint positions the answer is a formula in q_i. Lengths are mm, as in printed tables.
 

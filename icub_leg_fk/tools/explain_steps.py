@@ -7,7 +7,7 @@ An entry of a matrix is a float, or a sympy expression where the answer is to be
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 import math
@@ -159,6 +159,14 @@ def explanation(entry: ChainEntry, chain: Chain, foot_frame: str, q: Sequence[fl
         T_root_tip = product(T_root_tip, T)
     return Explanation(chain, 'Ro', tip, version.source, q, T_root_0, steps, tips, T_root_tip,
                        _frames(chain, q), algebra.symbols)
+
+
+def number(cell: Cell, symbols: Mapping[str, Cell]) -> float | None:
+    """Return the value of an entry; None if it depends on a joint without a value."""
+    if isinstance(cell, (int, float)):
+        return float(cell)
+    value = cell.subs(list(symbols.items())).evalf()
+    return float(value) if value.is_number else None
 
 
 def product(A: Matrix, B: Matrix) -> Matrix:

@@ -1,5 +1,8 @@
 """Exact arithmetic for `leg_fk explain`: sympy, with c_i and s_i for cosine and sine of theta_i.
 
+Where theta_i is a number they are its exact cosine and sine, as long as those are as simple as
+sqrt(3)/2; the cosine of 100 degrees stays c_i, since its powers would fill pages.
+
 Every product is linear in each joint's c_i and s_i, so nothing needs simplifying, but for joints
 with parallel axes: Rz(theta_3) Rx(pi) Rz(theta_4) = Rz(theta_3 - theta_4) Rx(pi). Such angles are
 added up while multiplying, and appear as c_34 and s_34.
@@ -56,7 +59,7 @@ class Exact:
     def cos_sin(self, row: Row, theta: Cell) -> tuple[Cell, Cell]:
         """Return cosine and sine of a row's theta: c_i and s_i if it is a symbol."""
         self._angles[row.index] = theta
-        return self._pair([(row.index, 1)], sympy.Integer(0))
+        return self._pair([(row.index, 1)])
 
     def cos_sin_constant(self, angle: Cell) -> tuple[Cell, Cell]:
         """Return cosine and sine of an angle that is no joint's."""
@@ -70,47 +73,38 @@ class Exact:
         x, y, z, sense = 0, 0, 0, 1  # translation since base; -1 once the z axis points back
         for step in steps:
             turned.append((step.row.index, sense))
-            c, s = self._pair(turned, sympy.Integer(0))
+            c, s = self._pair(turned)
             x, y, z = x + c * step.a, y + s * step.a, z + sense * step.d
             ca, sa = (sense * value for value in self.cos_sin_constant(step.alpha))
             within = [[c, -s * ca, s * sa, x], [s, c * ca, -c * sa, y],
                       [sympy.Integer(0), sa, ca, z], [0, 0, 0, 1]]
             T = within if base is None else product(base, within)
-            products.append([[self._tidy(cell) for cell in row] for row in T])
+            products.append(T)
             if sa == 0:
                 sense = int(ca)
             else:
                 base, turned, x, y, z, sense = products[-1], [], 0, 0, 0, 1
         return products
 
-    def _pair(self, turned: Sequence[tuple[int, int]], constant: Cell) -> tuple[Cell, Cell]:
-        """Return cosine and sine of the sum of some thetas."""
-        joints = []
-        for index, sense in turned:
-            angle = self._angles[index]
-            if angle.is_Symbol:
-                joints.append((index, sense))
-            else:
-                constant += sense * angle
-        if not joints:
-            return self.cos_sin_constant(constant)
-        total = sum(sense * self._angles[index] for index, sense in joints)
-        separator = '_' if max(joints)[0] > 9 else ''
-        name = separator.join(str(index) for index, _ in joints)
+    def _pair(self, turned: Sequence[tuple[int, int]]) -> tuple[Cell, Cell]:
+        """Return cosine and sine of a sum of thetas: numbers if they are simple, else symbols."""
+        angles = [(index, sense * self._angles[index]) for index, sense in turned]
+        joints = [index for index, angle in angles if not angle.is_number]
+        constant = sum((angle for _, angle in angles if angle.is_number), start=sympy.Integer(0))
+        cc, sc = self.cos_sin_constant(constant)
+        if not joints and (cc.is_Rational or sc.is_Rational or cc == sc or cc == -sc):
+            return cc, sc
+        if not joints:  # cos(100 deg) is not simple; the angle itself may be a symbol's
+            joints, constant, cc, sc = [index for index, _ in angles], 0, 1, 0
+        total = sum(angle for index, angle in angles if index in joints)
+        name = ('_' if max(joints) > 9 else '').join(map(str, joints))
         c = self._define(f'c_{name}', sympy.cos(total, evaluate=False))
         s = self._define(f's_{name}', sympy.sin(total, evaluate=False))
-        cc, sc = self.cos_sin_constant(constant)
         return c * cc - s * sc, s * cc + c * sc
 
     def _define(self, name: str, meaning: Cell) -> Cell:
         self.symbols[name] = meaning
         return sympy.Symbol(name)
-
-    def _tidy(self, cell: Cell) -> Cell:
-        """Multiply numbers out where that shortens them; symbols stay factored."""
-        if not sympy.sympify(cell).is_number:
-            return cell
-        return min(sympy.expand(cell), cell, key=sympy.count_ops)
 
 
 def exact_mm(metres: float) -> Cell:

@@ -37,7 +37,7 @@ def symbol_latex(name: str) -> str:
     return f'{greek}_{{{index.replace("_", chr(32))}}}'
 
 
-TEXT = Style(str, lambda number: str(number).replace('*', ' '), '({})')
+TEXT = Style(str, lambda number: str(number).replace('**', '^').replace('*', ' '), '({})')
 LATEX = Style(symbol_latex, _latex_constant, r'\left({}\right)')
 
 
@@ -59,12 +59,11 @@ def terms(cell: Cell, style: Style = TEXT) -> list[str]:
     return words
 
 
-def filled(words: list[str], width: int, first: int = 0) -> list[str]:
-    """Join terms to lines no wider than `width`, the first of which starts at column `first`."""
+def filled(words: list[str], width: int) -> list[str]:
+    """Join terms to lines no wider than `width`, unless a term itself is."""
     lines = ['']
     for word in words:
-        used = len(lines[-1]) + (first if len(lines) == 1 else 0)
-        if lines[-1] and used + 1 + len(word) > width:
+        if lines[-1] and len(lines[-1]) + 1 + len(word) > width:
             lines.append(word)
         else:
             lines[-1] = f'{lines[-1]} {word}' if lines[-1] else word

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 import math
 
-from icub_leg_fk.tools.explain_steps import Cell, Explanation, Matrix, pi_text, Step
+from icub_leg_fk.tools.explain_steps import Cell, Explanation, Matrix, number, pi_text, Step
 from icub_leg_fk.tools.explain_terms import cell_words, filled, terms
 from icub_leg_fk.tools.text import (
     beside,
@@ -172,7 +172,8 @@ def _dh_convention(e: Explanation) -> Lines:
     lines += ['', '  A_i = T_i(i+1) = Rz(theta_i) tz(d_i) tx(a_i) Rx(alpha_i)', '']
     lines += indented(beside('=', matrix(GENERAL_MATRIX, gap='   ')), 6)
     if e.symbols:
-        defined = [[name, f'= {cell_words(meaning)}'] for name, meaning in defined_symbols(e)]
+        defined = [[name, f'= {" ".join(_with_value(e, meaning))}']
+                   for name, meaning in defined_symbols(e)]
         lines += ['', '  In what follows c_i = cos(theta_i) and s_i = sin(theta_i), with', '']
         lines += indented(columns(defined), 4)
     return lines
@@ -185,25 +186,25 @@ def _link(e: Explanation, step: Step) -> Lines:
     return [f'{title}   {step.row.joint or "virtual link"}',
             '  ' + '   '.join(link_values(e, step)), '',
             *indented(beside('=', *blocks)), '',
-            *_equals('', step.A)]
+            *_equals(e, '', step.A)]
 
 
 def _products(e: Explanation) -> Lines:
     lines = ['Step 6. Multiply', '']
-    lines += _equals('T_01 = A_0', e.steps[0].T_0)
+    lines += _equals(e, 'T_01 = A_0', e.steps[0].T_0)
     for step in e.steps[1:]:
         i = step.row.index
-        lines += ['', *_equals(f'T_0{i + 1} = T_0{i} A_{i}', step.T_0)]
+        lines += ['', *_equals(e, f'T_0{i + 1} = T_0{i} A_{i}', step.T_0)]
     return lines
 
 
 def _answer(e: Explanation) -> Lines:
-    lines = _equals(f'T_{e.root}0', e.T_root_0)
+    lines = _equals(e, f'T_{e.root}0', e.T_root_0)
     for name, T in e.tips:
-        lines += ['', *_equals(name, T)]
-    lines += ['', *_equals(root_names(e), e.T_root_tip)]
+        lines += ['', *_equals(e, name, T)]
+    lines += ['', *_equals(e, root_names(e), e.T_root_tip)]
     if e.q is not None:
-        x, y, z = (short(float(row[3])) for row in e.T_root_tip[:3])
+        x, y, z = (short(number(row[3], e.symbols) or 0.0) for row in e.T_root_tip[:3])
         lines += ['', f'{e.chain.tip_frame} is at x = {x}, y = {y}, z = {z} mm in '
                       f'{e.chain.root_frame}.']
     return lines
@@ -213,7 +214,15 @@ def _cells(T: Matrix) -> list[list[str]]:
     return [[cell_words(cell) for cell in row] for row in T]
 
 
-def _equals(name: str, T: Matrix) -> Lines:
+def _with_value(e: Explanation, cell: Cell) -> list[str]:
+    """Return the terms of an expression and, if it has one, its value in decimals."""
+    words, value = terms(cell), number(cell, e.symbols)
+    if value is not None and short(value) != ' '.join(words):
+        words.append(f'= {short(value)}')
+    return words
+
+
+def _equals(e: Explanation, name: str, T: Matrix) -> Lines:
     """Return a matrix after its name, or its entries one by one if it is too wide."""
     lines = indented(beside(f'{name} ='.strip(), matrix(_cells(T), gap='  ')))
     if max(map(len, lines)) <= WIDTH:
@@ -221,9 +230,7 @@ def _equals(name: str, T: Matrix) -> Lines:
     lines = [f'  {name} =']
     for names, column in zip(COLUMN_NAMES, zip(*T[:3], strict=True), strict=True):
         for cell, value in zip(names, column, strict=True):
-            words = terms(value)
-            if not isinstance(value, float) and not value.free_symbols:
-                words.append(f'= {short(float(value))}')
-            first, *rest = filled(words, WIDTH - 12)
+            lines_of_sum = filled(_with_value(e, value), WIDTH - 12)
+            first, *rest = [part for line in lines_of_sum for part in wrapped(line, '  ', 12)]
             lines += [f'    {cell.ljust(4)} = {first}', *(' ' * 11 + line for line in rest)]
     return lines

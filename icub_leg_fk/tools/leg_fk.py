@@ -11,7 +11,6 @@ import argparse
 from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
-from importlib.util import find_spec
 import io
 import os
 import re
@@ -116,10 +115,7 @@ def _parser(words: Sequence[str]) -> Parser:
     subparsers = parser.add_subparsers(title='commands', metavar='COMMAND', required=True)
     chosen = next((word for word in words if not word.startswith('-')), '')
     for name in (chosen,) if chosen in MODULES else MODULES:
-        path = f'icub_leg_fk.tools.{MODULES[name]}'
-        if find_spec(path) is None:
-            continue
-        module = import_module(path)
+        module = import_module(f'icub_leg_fk.tools.{MODULES[name]}')
         subparser = subparsers.add_parser(
             name, help=module.HELP, description=module.HELP, epilog=module.EXAMPLES)
         module.add_arguments(subparser)

@@ -10,7 +10,7 @@ from icub_leg_fk.tools.chain_arguments import add_json, add_kinematics_file
 if TYPE_CHECKING:
     from icub_leg_fk.kinematics.catalog_file import ChainEntry
 
-HELP = 'list the chains of a kinematics file: versions, joints, tip frames'
+HELP = 'list the chains: versions, joints, tip frames'
 EXAMPLES = """\
 examples:
   leg_fk list

@@ -8,6 +8,7 @@ import math
 import textwrap
 from typing import Any
 
+from icub_leg_fk.errors import LegFKError
 from icub_leg_fk.kinematics.link import DHLink
 
 WIDTH = 98
@@ -82,15 +83,22 @@ def indented(lines: Iterable[str], by: int = 2) -> list[str]:
     return [' ' * by + line if line else '' for line in lines]
 
 
-def wrapped(text: str, after: str = '  ') -> list[str]:
+def wrapped(text: str, after: str = '  ', margin: int = 0) -> list[str]:
     """Return the lines of a sentence, all but the first moved to the right."""
-    return textwrap.wrap(text, WIDTH, subsequent_indent=after, break_long_words=False,
+    return textwrap.wrap(text, WIDTH - margin, subsequent_indent=after, break_long_words=False,
                          break_on_hyphens=False)
 
 
 def json_text(value: Any) -> str:
-    """Return JSON with its innermost lists of numbers or words on one line each."""
-    return _json(value, 0)
+    """Return JSON with its innermost lists of numbers or words on one line each.
+
+    Raises:
+        LegFKError: a number in it is infinite, which JSON cannot say.
+    """
+    try:
+        return _json(value, 0)
+    except ValueError as error:
+        raise LegFKError('found lengths too large to compute with') from error
 
 
 def _json(value: Any, depth: int) -> str:

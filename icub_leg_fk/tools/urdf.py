@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from icub_leg_fk.kinematics import Catalog
     from icub_leg_fk.tools.urdf_model import Selection
 
-HELP = 'write chains as a URDF, for robot_state_publisher, RViz, Pinocchio'
+HELP = 'write chains as a URDF, for RViz, Pinocchio and others'
 EXAMPLES = """\
 The URDF has the frames of the tables: both tip frames where a chain has two, joint names and
 printed ranges. Every chain hangs from the root frame, which the chains must share.

@@ -1,0 +1,142 @@
+"""`leg_fk explain` in decimals, and what holds of every form of it."""
+
+import json
+from pathlib import Path
+import re
+
+from explain_cases import (
+    every_chain,
+    EXAMPLES,
+    explain,
+    in_metres,
+    one_chain_of_each_kind,
+    positions,
+)
+from leg_fk_process import assert_one_line_complaint, leg_fk
+import numpy as np
+import pytest
+
+SPEC = Path(__file__).parent.parent.parent / 'shared' / 'spec' / '001_055926a478fe2c09.txt'
+
+
+@every_chain
+def test_the_answer_is_the_chains_pose(words, chain):
+    q = positions(chain, 1)
+    e = json.loads(explain(*words, '--json', '--radians', *q))
+    assert np.abs(in_metres(e['T_root_tip']) - chain.forward(q)).max() < 1e-12
+    assert (e['chain'], e['version']) == (chain.name, chain.version)
+    assert (e['root_frame'], e['tip_frame']) == (chain.root_frame, chain.tip_frame)
+
+
+@every_chain
+def test_each_step_follows_from_the_one_before(words, chain):
+    e = json.loads(explain(*words, '--json', '--radians', *positions(chain, 2)))
+    T_0 = np.eye(4)
+    for link, product in zip(e['links'], e['running_products'], strict=True):
+        factors = [np.array(link['factors'][name]) for name in ('Rz', 'tz', 'tx', 'Rx')]
+        assert np.allclose(np.linalg.multi_dot(factors), link['A'], rtol=0, atol=1e-10)
+        T_0 = T_0 @ link['A']
+        assert np.allclose(T_0, product, rtol=0, atol=1e-10)
+    T = np.array(e['T_root_0']) @ T_0
+    for after in e['after_last_link'].values():
+        T = T @ after
+    assert np.allclose(T, e['T_root_tip'], rtol=0, atol=1e-10)
+
+
+@every_chain
+def test_the_frames_obey_the_first_four_steps_of_the_method(words, chain):
+    e = json.loads(explain(*words, '--json', '--radians', *positions(chain, 3)))
+    for before, own in zip(e['frames'], e['frames'][1:], strict=False):
+        assert abs(np.dot(own['x'], before['z'])) < 1e-12
+        assert abs(np.dot(own['x'], own['z'])) < 1e-12
+        assert np.allclose(np.cross(own['z'], own['x']), own['y'], atol=1e-12)
+        # x points along the common normal, so that from z_(i-1) it meets the origin of frame i.
+        reach = np.subtract(own['origin'], before['origin'])
+        assert abs(np.dot(np.cross(before['z'], own['x']), reach)) < 1e-9
+    assert len(e['frames']) == len(e['links']) + 1
+
+
+@pytest.mark.parametrize(('words', 'position'), [
+    (['left_leg', '--version', 'v1'], (0, -68.1, -597.5)),
+    (['right_leg', '--version', 'v1'], (0, 68.1, -597.5)),
+    (['left_leg', '--version', 'v2_5'], (4.4175, -68.1, -622.995)),
+    (['right_leg', '--version', 'v2_5'], (4.4175, 68.1, -622.995)),
+    (['head_imu', '--version', 'v2'], (13, 6.6, 375.6)),
+])
+def test_at_zero_the_text_ends_with_the_documented_position(words, position):
+    text = explain(*words, '--degrees', *[0] * 6)
+    x, y, z = position
+    assert f'is at x = {x:g}, y = {y:g}, z = {z:g} mm in root_link.' in text.splitlines()[-1]
+
+
+ROW = re.compile(r'i = (?P<i>\d) +(?P<a>\S+) +(?P<d>\S+) +(?P<alpha>\S+) +'
+                 r'((?P<offset>\S+) \+ )?\(?(?P<lower>-?\d+) ?- ?> ?\+?(?P<upper>-?\d+)\)?')
+
+
+def table(text):
+    return [match.groupdict(default='0') for match in ROW.finditer(text)]
+
+
+@pytest.mark.skipif(not SPEC.exists(), reason='the documents of the robot are not here')
+@pytest.mark.parametrize(('heading', 'following', 'words'), [
+    ('Left-V1', 'Left-V2_5', ['left_leg', '--version', 'v1']),
+    ('Left-V2_5', 'Right-V1', ['left_leg', '--version', 'v2_5']),
+    ('Right-V1', 'Right-V2_5', ['right_leg', '--version', 'v1']),
+    ('Right-V2_5', None, ['right_leg', '--version', 'v2_5'])])
+def test_the_table_is_the_printed_one(heading, following, words):
+    _, _, document = SPEC.read_text(encoding='utf-8').partition(f'\n{heading}\n')
+    if following:
+        document, _, _ = document.partition(f'\n{following}\n')
+    printed = table(document)
+    assert len(printed) == 6
+    assert table(explain(*words, '--degrees', *[0] * 6)) == printed
+
+
+def test_numbers_stand_with_their_points_under_each_other():
+    lines = explain('left_leg', '--degrees', 10, 12, 14, -30, -15, 5).splitlines()
+    first = next(i for i, line in enumerate(lines) if 'T_RoLf = T_Ro0 T_06 = [' in line) - 1
+    points = [[match.start() for match in re.finditer(r'\.', line)]
+              for line in lines[first:first + 3]]
+    assert len(points[0]) == 4 and points[0] == points[1] == points[2]
+
+
+@one_chain_of_each_kind
+def test_every_line_fits_a_terminal(words, chain):
+    for values in ([], ['--radians', *positions(chain, 4)]):
+        for line in explain(*words, *values).splitlines():
+            assert len(line) <= 100, line
+
+
+def test_a_prismatic_arm_is_explained_as_the_textbook_has_it():
+    text = explain('arm', '-k', EXAMPLES / 'cylindrical_arm.yaml', '--version', 'v1')
+    # T_03 of Spong, Hutchinson and Vidyasagar's example 3.2, with d_1 = 400 and their d_2, d_3.
+    assert text.count('T_RoE = T_Ro0 T_03 =') == 1
+    rows = [' '.join(row.split()) for row in re.findall(r'\[([^]]*)\]', text)[-4:]]
+    assert rows == ['c_0 0 -s_0 -s_0 d_2', 's_0 0 c_0 c_0 d_2', '0 -1 0 d_1 + 400', '0 0 0 1']
+    assert 'd_2      = q_2 + 150' in text and 'lift slides along it' in text
+
+
+def test_the_steps_are_walked_in_order():
+    text = explain('left_leg', '--degrees', *[0] * 6)
+    places = [text.index(f'Step {i}.') for i in range(1, 7)]
+    assert places == sorted(places)
+    for words in ('A_5 = T_56 = Rz(theta_5) tz(d_5) tx(a_5) Rx(alpha_5)', 'T_06 = T_05 A_5',
+                  'T_Ro0 =', 'T_RoLf = T_Ro0 T_06'):
+        assert words in text
+    assert 'z_2 ends, 0.9175 mm away' in text and 'z_0 and z_1 meet here' in text
+    assert 'z_4 parallel to z_3, 200.5 mm away' in text
+
+
+@pytest.mark.parametrize(('words', 'complaint'), [
+    ([], 'CHAIN'),
+    (['left_foot'], "unknown chain: 'left_foot'; known: left_leg, right_leg, head_imu"),
+    (['left_leg', '--version', 'v4'], 'known: v1, v2_5, v3'),
+    (['left_leg', '--foot-frame', 'toe'], 'known: dh, sole'),
+    (['left_leg', '--degrees', '1', '2'], 'found 2, allowed: 6, in the order l_hip_pitch'),
+    (['left_leg', '--degrees', 'x'], "found 'x', allowed: finite numbers"),
+    (['left_leg', '--json', '--latex'], 'not allowed with'),
+    (['left_leg', '--degrees', '1', '--radians', '1'], 'not allowed with'),
+    (['left_leg', '-k', 'missing.yaml'], 'missing.yaml'),
+])
+def test_a_mistake_is_one_line_and_exit_2(words, complaint):
+    assert_one_line_complaint(leg_fk('explain', *words), complaint)
