@@ -22,13 +22,11 @@ import math
 from typing import NamedTuple
 
 from icub_leg_fk.kinematics import Chain
+from icub_leg_fk.ros.joint_names import JointNames, ResolvedNames
 
 MESSAGE_REASONS = ('malformed', 'empty_position', 'short_position', 'duplicate_name', 'time_jump')
 CHAIN_REASONS = ('missing_joint', 'non_finite', 'stale_joint', 'no_velocity')
 LARGEST_POSITION = 1e150  # beyond it sums and products of positions overflow
-_REMEMBERED_NAME_LISTS = 64
-_REMEMBERED_NAMES = 1000  # in one list, and
-_REMEMBERED_CHARACTERS = 65536  # in it; what a stranger sends may be longer
 
 
 class JointVector(NamedTuple):
@@ -64,14 +62,6 @@ class ChainCounts:
         self.joints.setdefault(reason, {}).update(joints)
 
 
-class _Names(NamedTuple):
-    """A list of names, resolved: (index in the message, slot) pairs and the chains touched."""
-
-    duplicate: str | None
-    pairs: tuple[tuple[int, int], ...]
-    chains: tuple[int, ...]
-
-
 class JointInput:
     """Holds the newest position of every joint of some chains and applies the rules.
 
@@ -96,11 +86,7 @@ class JointInput:
         self.newest: int | None = None
         self._report = report
         self._timeout_ns = round(joint_timeout * 1e9)
-        self._slots = {name: slot for slot, name in enumerate(
-            dict.fromkeys(name for chain in self.chains for name in chain.joint_names))}
-        self._chain_slots = [tuple(self._slots[name] for name in chain.joint_names)
-                             for chain in self.chains]
-        self._names: dict[tuple[str, ...], _Names] = {}
+        self._names = JointNames(self.chains)
         self._forget()
 
     def update(self, stamp_ns: int, names: tuple[str, ...], positions: Sequence[float],
@@ -121,7 +107,7 @@ class JointInput:
             self._reject('short_position', f'position has {len(positions)} values for '
                          f'{len(names)} names; message ignored')
             return []
-        resolved = self._names.get(names) or self._resolve(names)
+        resolved = self._names.resolve(names)
         if resolved.duplicate is not None:
             self._reject('duplicate_name', f'name {resolved.duplicate[:60]!r} stands twice; '
                          'message ignored')
@@ -158,7 +144,7 @@ class JointInput:
             self.chain_counts[chain].ready += repeats
         if names:
             self.newest = stamp_ns if self.newest is None else max(self.newest, stamp_ns)
-        for index, slot in (self._names.get(names) or self._resolve(names)).pairs:
+        for index, slot in self._names.resolve(names).pairs:
             self._stamps[slot] = stamp_ns
             self._positions[slot] = positions[index]
             self._velocities[slot] = math.nan
@@ -182,18 +168,18 @@ class JointInput:
 
     def take_over(self, previous: JointInput) -> None:
         """Go on with the joints and message counts of an input that this one replaces."""
-        self.messages, self.counts, self.newest = \
-            previous.messages, previous.counts, previous.newest
-        for name, slot in self._slots.items():
-            if (old := previous._slots.get(name)) is not None:
+        self.messages, self.counts = previous.messages, previous.counts
+        for name, slot in self._names.slots.items():
+            if (old := previous._names.slots.get(name)) is not None:
                 self._stamps[slot] = previous._stamps[old]
                 self._positions[slot] = previous._positions[old]
                 self._velocities[slot] = previous._velocities[old]
+        self.newest = max((stamp for stamp in self._stamps if stamp is not None), default=None)
 
     def known_joints(self, chain: int) -> dict[str, int]:
         """Return the stamps [ns] of those joints of a chain that are held."""
         return {name: stamp for name, slot in zip(
-            self.chains[chain].joint_names, self._chain_slots[chain], strict=True)
+            self.chains[chain].joint_names, self._names.chain_slots[chain], strict=True)
             if (stamp := self._stamps[slot]) is not None}
 
     def _reject(self, reason: str, text: str) -> None:
@@ -201,29 +187,12 @@ class JointInput:
         self._report(reason, text)
 
     def _forget(self) -> None:
-        self._stamps: list[int | None] = [None] * len(self._slots)
-        self._positions = [math.nan] * len(self._slots)
-        self._velocities = [math.nan] * len(self._slots)
+        self._stamps: list[int | None] = [None] * len(self._names.slots)
+        self._positions = [math.nan] * len(self._names.slots)
+        self._velocities = [math.nan] * len(self._names.slots)
         self.newest = None
 
-    def _resolve(self, names: tuple[str, ...]) -> _Names:
-        duplicate = None
-        if len(set(names)) != len(names):
-            duplicate = next(name for name, count in Counter(names).items() if count > 1)
-        pairs = tuple((index, self._slots[name]) for index, name in enumerate(names)
-                      if name in self._slots)
-        brought = {slot for _, slot in pairs}
-        chains = tuple(index for index, slots in enumerate(self._chain_slots)
-                       if brought.intersection(slots))
-        resolved = _Names(duplicate, pairs, chains)
-        if (len(names) <= _REMEMBERED_NAMES
-                and sum(map(len, names)) <= _REMEMBERED_CHARACTERS):
-            if len(self._names) >= _REMEMBERED_NAME_LISTS:
-                self._names.clear()
-            self._names[names] = resolved
-        return resolved
-
-    def _stepped_back(self, stamp_ns: int, resolved: _Names) -> bool:
+    def _stepped_back(self, stamp_ns: int, resolved: ResolvedNames) -> bool:
         if self.newest is None or stamp_ns >= self.newest:
             return False
         if self._timeout_ns and stamp_ns < self.newest - self._timeout_ns:
@@ -232,7 +201,7 @@ class JointInput:
         return any(stamp is not None and stamp > stamp_ns for stamp in held)
 
     def _joint_vector(self, index: int) -> JointVector | None:
-        chain, slots, counts = self.chains[index], self._chain_slots[index], \
+        chain, slots, counts = self.chains[index], self._names.chain_slots[index], \
             self.chain_counts[index]
         stamps = [self._stamps[slot] for slot in slots]
         positions = tuple([self._positions[slot] for slot in slots])

@@ -1,0 +1,231 @@
+"""The rules of the joint input, one by one, on the iCub's legs."""
+
+import math
+import tracemalloc
+
+from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.ros.joint_input import JointInput
+import numpy as np
+import pytest
+
+LEFT, RIGHT = 0, 1
+MS = 1_000_000  # ns
+START = 1_700_000_000_000 * MS
+
+
+class Robot:
+    """A joint input of both legs, with what it reported."""
+
+    def __init__(self, joint_timeout=0.5):
+        catalog = Catalog.load()
+        self.chains = [catalog.chain(name, 'v2_5') for name in ('left_leg', 'right_leg')]
+        self.left, self.right = (chain.joint_names for chain in self.chains)
+        self.both = self.left + self.right
+        self.reports = []
+        self.input = JointInput(self.chains, joint_timeout,
+                                lambda reason, text: self.reports.append((reason, text)))
+
+    def send(self, ms, names, positions=None, velocities=()):
+        """Send a message at a time [ms from the start] and return what it made ready."""
+        if positions is None:
+            positions = [0.01 * i for i in range(len(names))]
+        return self.input.update(START + ms * MS, tuple(names), positions, velocities)
+
+    def ready(self, *args, **kwargs):
+        return [vector.chain for vector in self.send(*args, **kwargs)]
+
+    def reported(self):
+        """Return the only report since the last call."""
+        [report] = self.reports
+        self.reports.clear()
+        return report
+
+
+@pytest.fixture
+def robot():
+    return Robot()
+
+
+def test_joints_are_matched_by_name_in_any_order_among_others(robot):
+    rng = np.random.default_rng(1)
+    names = [*robot.both, 'neck_pitch', 'l_elbow', '']
+    angles = dict(zip(names, rng.uniform(-1, 1, len(names)).tolist()))
+    for ms in range(20):
+        rng.shuffle(names)
+        left, right = robot.send(ms, names, [angles[name] for name in names])
+        assert left.positions == tuple(angles[name] for name in robot.left)
+        assert right.positions == tuple(angles[name] for name in robot.right)
+    assert robot.reports == []
+
+
+def test_a_chain_is_ready_when_its_last_joint_came(robot):
+    assert robot.ready(0, robot.left[:4]) == []
+    reason, text = robot.reported()
+    assert reason == 'missing_joint'
+    assert text == ('left_leg: no pose: l_ankle_pitch never seen, l_ankle_roll never seen')
+    assert robot.ready(1, robot.left[4:]) == [LEFT]
+    assert robot.ready(2, robot.left[:1]) == [LEFT]
+
+
+def test_a_message_makes_only_the_chains_it_touches_ready(robot):
+    assert robot.ready(0, robot.both) == [LEFT, RIGHT]
+    assert robot.ready(1, robot.right) == [RIGHT]
+    assert robot.ready(2, robot.left) == [LEFT]
+    assert robot.ready(3, ['neck_pitch']) == []
+
+
+def test_partial_messages_update_just_what_they_bring(robot):
+    robot.send(0, robot.left, [0.1] * 6)
+    [vector] = robot.send(1, robot.left[2:4], [0.3, -0.4])
+    assert vector.positions == (0.1, 0.1, 0.3, -0.4, 0.1, 0.1)
+
+
+@pytest.mark.parametrize(('timeout', 'age', 'ready'), [
+    (0.5, 500, True), (0.5, 501, False), (0.02, 20, True), (0.02, 21, False), (0, 10**9, True)])
+def test_a_joint_older_than_the_timeout_beside_its_newest_peer_holds_the_chain_back(
+        timeout, age, ready):
+    robot = Robot(timeout)
+    robot.send(0, robot.left)
+    assert robot.ready(age, robot.left[1:]) == ([LEFT] if ready else [])
+    if not ready:
+        assert robot.reported() == (
+            'stale_joint', f'left_leg: no pose: l_hip_pitch {age / 1000:.3f} s old')
+        assert robot.ready(age + 1, robot.left[:1]) == [LEFT]
+
+
+def test_age_counts_beside_the_chains_own_joints_only(robot):
+    robot.send(0, robot.left)
+    robot.send(400, robot.right)
+    assert robot.ready(450, robot.left[:1]) == [LEFT]
+
+
+@pytest.mark.parametrize('short', [1, 5])
+def test_positions_shorter_than_names_reject_the_message(robot, short):
+    robot.send(0, robot.left, [0.1] * 6)
+    assert robot.ready(1, robot.left, [0.2] * (6 - short)) == []
+    assert robot.reported() == (
+        'short_position', f'position has {6 - short} values for 6 names; message ignored')
+    assert robot.send(2, robot.left[5:], [0.3])[0].positions == (0.1,) * 5 + (0.3,)
+
+
+def test_an_empty_position_is_counted_only(robot):
+    for names in (robot.both, (), ('a', 'a')):
+        assert robot.ready(0, names, []) == []
+    assert robot.reports == []
+    assert robot.input.counts == {'empty_position': 3}
+
+
+def test_a_name_that_stands_twice_rejects_the_message_even_a_strangers(robot):
+    robot.send(0, robot.left, [0.1] * 6)
+    for twice in ('l_knee', 'stranger'):
+        assert robot.ready(1, (*robot.left, twice, 'stranger'), [0.2] * 8) == []
+        assert robot.reported() == (
+            'duplicate_name', f'name {twice!r} stands twice; message ignored')
+    assert robot.send(2, robot.left[5:], [0.3])[0].positions == (0.1,) * 5 + (0.3,)
+
+
+def test_a_very_long_name_does_not_fill_the_log(robot):
+    robot.send(0, ('x' * 100_000,) * 2)
+    assert len(robot.reported()[1]) < 120
+
+
+@pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf, 1e200])
+def test_an_angle_that_is_not_finite_holds_back_just_its_chain(robot, value):
+    positions = [0.1] * 12
+    positions[3] = value
+    assert robot.ready(0, robot.both, positions) == [RIGHT]
+    assert robot.reported() == ('non_finite', f'left_leg: no pose: l_knee {value}')
+    assert robot.ready(1, robot.left[:3]) == []
+    assert robot.ready(2, ['l_knee']) == [LEFT]
+
+
+def test_out_of_range_goes_out_as_it_is_and_is_noted(robot):
+    [vector] = robot.send(0, robot.left, [0.0, 0.0, 0.0, 9.0, 0.0, -8.0])
+    assert vector.positions == (0.0, 0.0, 0.0, 9.0, 0.0, -8.0)
+    counts = robot.input.chain_counts[LEFT]
+    assert counts.joints == {'out_of_range': {'l_knee': '9', 'l_ankle_roll': '-8'}}
+    assert counts.ready == 1
+
+
+def test_a_looping_bag_goes_on_with_the_very_message_and_says_so_once(robot):
+    for _ in range(3):
+        for ms in range(0, 20_000, 100):
+            assert robot.ready(ms, robot.both) == [LEFT, RIGHT]
+    assert [reason for reason, _ in robot.reports] == ['time_jump'] * 2
+    assert robot.reports[0][1] == (
+        'time stepped back to 1700000000.000 s; held joints are forgotten')
+
+
+def test_a_step_back_forgets_the_joints_of_every_chain(robot):
+    robot.send(10_000, robot.both)
+    assert robot.ready(0, robot.left) == [LEFT]
+    assert robot.input.known_joints(RIGHT) == {}
+    assert robot.ready(1, robot.right[:5]) == []
+    assert robot.ready(2, robot.right) == [RIGHT]
+
+
+def test_publishers_of_different_joints_may_interleave_out_of_order(robot):
+    robot.send(0, robot.both)
+    for ms in range(10, 1000, 10):
+        assert robot.ready(ms, robot.left) == [LEFT]
+        assert robot.ready(ms - 5, robot.right) == [RIGHT]
+    assert robot.reports == []
+
+
+def test_a_joint_older_than_what_is_held_of_it_is_a_step_back(robot):
+    robot.send(10, robot.both)
+    assert robot.ready(9, robot.left[:1]) == []
+    assert robot.input.counts == {'time_jump': 1}
+
+
+def test_strangers_messages_do_not_move_time(robot):
+    robot.send(0, robot.both)
+    assert robot.ready(10**9, ['wheel']) == []
+    assert robot.ready(1, robot.left) == [LEFT]
+    assert robot.input.counts == {}
+
+
+def test_velocities_come_along_if_all_are_there(robot):
+    [vector] = robot.send(0, robot.left, [0.1] * 6, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+    assert vector.velocities == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+
+
+@pytest.mark.parametrize('velocities', [(), (1.0,) * 5, (1.0,) * 5 + (math.nan,),
+                                        (math.inf,) + (1.0,) * 5])
+def test_velocities_that_are_absent_short_or_not_finite_are_none(robot, velocities):
+    robot.send(0, robot.left, [0.1] * 6, [1.0] * 6)
+    [vector] = robot.send(1, robot.left, [0.1] * 6, velocities)
+    assert vector.velocities is None
+
+
+def test_what_strangers_send_is_not_hoarded(robot):
+    """Name lists are remembered for speed, but neither too many nor too long ones."""
+    robot.send(0, robot.both)
+    tracemalloc.start()
+    for i in range(100):
+        assert robot.ready(1, (*robot.left, f'{i}', *(f'{i}.{j}' for j in range(2000)))) == [LEFT]
+        assert robot.ready(1, (*robot.left, f'{i}', 'x' * (100_000 + i))) == [LEFT]
+        assert robot.ready(1, (*robot.left, f'{i}')) == [LEFT]
+    held, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert held < 1_000_000
+
+
+def test_a_new_input_takes_over_what_is_held(robot):
+    robot.send(0, robot.both, [0.1] * 12)
+    successor = JointInput(robot.chains[::-1], 0.5)
+    successor.take_over(robot.input)
+    [vector] = successor.update(START + MS, robot.left[:1], [0.2])
+    assert vector.positions == (0.2,) + (0.1,) * 5
+    assert successor.messages == 2
+
+
+def test_joints_that_are_not_taken_over_do_not_move_time():
+    before, catalog = Robot(), Catalog.load()
+    before.send(0, before.left)
+    before.send(400, before.right)
+    successor = JointInput([catalog.chain('left_leg', 'v1')], 0.1)
+    successor.take_over(before.input)
+    assert successor.newest == START
+    assert [vector.chain for vector in successor.update(START, before.left[:1], [0.2])] == [0]
+    assert successor.counts == {}
