@@ -9,12 +9,11 @@ import sys
 import tracemalloc
 from typing import Any
 
-from icub_leg_fk.kinematics import Catalog, Chain
-import numpy as np
-
 from bench.kinematics_peers import PEERS, readings_us
 from bench.measure import difference, figure, ratio
 from bench.report import Report
+from icub_leg_fk.kinematics import Catalog, Chain
+import numpy as np
 
 _PEERS_FILE = Path(__file__).with_name('kinematics_peers.py')
 _PYTHONS = (sys.executable, '/usr/bin/python3')  # Debian's PyKDL is in the system's Python only
@@ -49,7 +48,7 @@ def measure_kinematics(report: Report, seconds: float) -> None:
         report.row(f'{label}, one pose with quaternion', figure(peer['one']), 'us')
         report.row(f'{label}, {_MANY_HOW[name]}', figure(peer['many']), 'us')
     if not isinstance(peers['pinocchio'], str):
-        report.row('many poses, Pinocchio\'s loop / ours',
+        report.row("many poses, Pinocchio's loop / ours",
                    ratio(peers['pinocchio']['many'], ours_many), 'x', at_least=8.0)
     beyond = [_memory_beyond_result(chain, Q[:count]) for count in (_MANY // 10, _MANY)]
     report.row(f'memory beyond the result: {_MANY} poses less {_MANY // 10}',

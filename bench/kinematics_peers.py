@@ -107,7 +107,8 @@ def pykdl(task: dict[str, Any]) -> dict[str, Any]:
         solver.JntToCart(q, frame)
         return [[*(frame.M[i, j] for j in range(3)), frame.p[i]] for i in range(3)] + [
             [0.0, 0.0, 0.0, 1.0]]
-    return {'version': getattr(kdl, '__version__', ''), 'poses': [matrix(q) for q in Q[:_COMPARED]],
+    return {'version': getattr(kdl, '__version__', ''),
+            'poses': [matrix(q) for q in Q[:_COMPARED]],
             'one': readings_us(one, len(Q), task['seconds']),
             'many': readings_us(loop, len(Q), task['seconds'])}
 

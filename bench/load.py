@@ -89,8 +89,6 @@ class Process:
 
 def robot(connection: Connection) -> None:
     """Publish JointStates: ('send', topic, joints, rate, count) answers with the stamps [ns]."""
-    import rclpy
-    from rclpy.node import Node
     from rclpy.serialization import serialize_message
     from sensor_msgs.msg import JointState
     node, qos = _node('robot')
@@ -154,8 +152,8 @@ def _send(publish: Any, messages: list[bytearray], rate: float, count: int) -> l
 
 def observer(connection: Connection) -> None:
     """Subscribe to poses: 'watch' topics, 'drop' them, 'take' what has come, know the 'first'."""
-    import rclpy
     from geometry_msgs.msg import PoseStamped
+    import rclpy
     from rclpy.experimental.events_executor import EventsExecutor
     node, qos = _node('observer')
     executor = EventsExecutor()
