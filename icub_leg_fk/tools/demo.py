@@ -139,8 +139,8 @@ def conclude(recording: JointRecording, answers: Sequence[Answers], output: Path
           f'latency       median {median:.2f} ms   p99 {p99:.2f} ms   max {largest:.2f} ms\n'
           f'picture       {output}', flush=True)
     if lost or unasked:
-        print(f'leg_fk: error: of {sent * len(answers)} poses {lost} did not arrive, and {unasked} '
-              'arrived that belong to no message', file=sys.stderr)
+        print(f'leg_fk: error: of {sent * len(answers)} poses {lost} did not arrive, and '
+              f'{unasked} arrived that belong to no message', file=sys.stderr)
         return 1
     return 0
 

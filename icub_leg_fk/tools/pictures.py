@@ -137,7 +137,7 @@ def _draw_scene(view: legs.View, scene: Sequence[Sample], floor: tuple[Array, Ar
     legs.draw_ground(view, low, xs, ys)
     legs.draw_forward(view, (xs[0] + 0.16, ys[0], low))
     legs.draw_ruler(view, xs[0], ys[-1], low)
-    legs.draw_triad(view, np.eye(4), 0.1, 2.4, 60, labels=True)
+    legs.draw_triad(view, np.eye(4), 0.1, 2.4, 60, labels='xyz')
     nearness = np.argsort(np.argsort([view.depth(points) for points in reach]))
     for (track, i), rank in zip(scene, nearness, strict=True):
         z = 10.0 + 10 * float(rank)

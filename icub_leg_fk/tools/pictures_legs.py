@@ -83,7 +83,7 @@ class View:
 
 
 def draw_triad(view: View, T: Array, length: float, width: float, zorder: float,
-               labels: bool = False) -> None:
+               labels: Sequence[str] = ()) -> None:
     """Draw a frame's axes: x red, y green, z blue.
 
     Args:
@@ -92,7 +92,7 @@ def draw_triad(view: View, T: Array, length: float, width: float, zorder: float,
         length: of the axes [m].
         width: of the lines [points].
         zorder: of the nearest axis; farther ones are drawn before.
-        labels: whether to write x, y and z at the ends.
+        labels: what to write at the ends of the three axes; nothing if empty.
     """
     origin = T[:3, 3]
     for i in np.argsort([view.depth(T[:3, i]) for i in range(3)]):
@@ -100,8 +100,10 @@ def draw_triad(view: View, T: Array, length: float, width: float, zorder: float,
         view.arrow(origin, end, color=AXIS_COLORS[i], linewidth=width, zorder=zorder,
                    mutation_scale=4.5 * width)
         if labels:
-            view.text(origin + 1.18 * length * T[:3, i], 'xyz'[i], color=AXIS_COLORS[i],
-                      weight='bold', fontsize=12, zorder=zorder + 1)
+            right, up = view.project(T[:3, i]).tolist()
+            view.text(end, labels[i], (9 * right, 9 * up), color=AXIS_COLORS[i], weight='bold',
+                      ha='center' if abs(right) < 0.3 else 'left' if right > 0 else 'right',
+                      va='bottom' if up > 0.5 else 'center', zorder=zorder + 1)
 
 
 def draw_leg(view: View, chain: Chain, q: ArrayLike, has_sole: bool, zorder: float = 10.0,

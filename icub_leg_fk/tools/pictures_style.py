@@ -72,12 +72,13 @@ def check_output(path: Path, force: bool) -> None:
                               'that name, allowed: a new name, or --force to replace a file')
 
 
-def save_picture(draw: Callable[[], Figure], path: Path) -> None:
+def save_picture(draw: Callable[[], Figure], path: Path, dpi: int = 150) -> None:
     """Draw a picture in the common style and write it, whole or not at all.
 
     Args:
         draw: returns the figure.
         path: file to write or replace, good by `check_output`.
+        dpi: pixels per inch of a PNG.
 
     Raises:
         OutputFileError: the file cannot be written.
@@ -93,7 +94,7 @@ def save_picture(draw: Callable[[], Figure], path: Path) -> None:
         raise OutputFileError(f'{path}: {error.strerror}') from error
     try:
         with rc_context(_SETTINGS), os.fdopen(handle, 'wb') as stream:  # type: ignore[arg-type]
-            draw().savefig(stream, format=kind, dpi=150, metadata=metadata)
+            draw().savefig(stream, format=kind, dpi=dpi, metadata=metadata)
         os.chmod(name, 0o666 & ~_umask())
         os.replace(name, path)
     except OSError as error:

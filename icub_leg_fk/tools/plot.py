@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 from pathlib import Path
+import sys
 from typing import TYPE_CHECKING
 
 from icub_leg_fk.errors import InputFileError, LegFKError
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from icub_leg_fk.kinematics import Catalog, Chain
+    from icub_leg_fk.tools.plot_bag import BagTracks
     from icub_leg_fk.tools.recording import ChainTrack
 
 HELP = 'a picture of the feet over time and of the legs in space, from a bag or a CSV file'
@@ -21,6 +23,9 @@ EXAMPLES = """\
 INPUT is a rosbag2 bag (directory, .mcap or .db3) with JointState messages, read by the node's
 own rules, or a CSV file with a column `time` in seconds and one column per joint, in radians;
 other columns are ignored. Gaps and joints outside their documented ranges are marked.
+
+exit status: 0, 1 if a part of a bag could not be read (the picture has all the rest), 2 if there
+is no picture.
 
 examples:
   leg_fk plot walking.csv
@@ -30,6 +35,7 @@ examples:
 
 DEFAULT_CHAINS = ('left_leg', 'right_leg')
 MAX_INSTANTS = 4
+PARTLY_READ = 1  # the exit status
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -68,7 +74,8 @@ def run(args: argparse.Namespace) -> int:
                              'file')
     catalog = Catalog.load(args.kinematics_file)
     chains = chosen_chains(catalog, args.chains, args.version, args.foot_frame)
-    tracks = _tracks(args.input, chains, args.joint_topic)
+    found = _read(args.input, chains, args.joint_topic)
+    tracks = found.tracks
     instants = _checked(args.at, tracks) if args.at else telling_instants(tracks)
     versions = dict.fromkeys(chain.version for chain in chains)
     title = f'{args.input.resolve().name}   {", ".join(versions)}'
@@ -76,7 +83,10 @@ def run(args: argparse.Namespace) -> int:
     save_picture(lambda: feet_figure(tracks, instants, title, soled), output)
     poses = ', '.join(f'{len(track.times)} poses of {track.chain.tip}' for track in tracks)
     print(f'{output}: {poses}')
-    return 0
+    for text in (*(f'not drawn: {chain}' for chain in found.poseless),
+                 *(f'not all could be read: {problem}' for problem in found.damage)):
+        print(f'leg_fk: note: {text}', file=sys.stderr)
+    return PARTLY_READ if found.damage else 0
 
 
 def chosen_chains(catalog: Catalog, names: Sequence[str] | None, version: str | None,
@@ -114,8 +124,8 @@ def telling_instants(tracks: Sequence[ChainTrack]) -> list[float]:
         if end > start else [start]
 
 
-def _tracks(path: Path, chains: Sequence[Chain], topic: str | None) -> list[ChainTrack]:
-    from icub_leg_fk.tools.plot_bag import read_bag
+def _read(path: Path, chains: Sequence[Chain], topic: str | None) -> BagTracks:
+    from icub_leg_fk.tools.plot_bag import BagTracks, read_bag
     from icub_leg_fk.tools.recording import read_csv
 
     if path.suffix.lower() != '.csv':
@@ -124,7 +134,7 @@ def _tracks(path: Path, chains: Sequence[Chain], topic: str | None) -> list[Chai
         raise LegFKError(f'--joint-topic: {path} is a CSV file, which has no topics')
     joints = dict.fromkeys(name for chain in chains for name in chain.joint_names)
     recording = read_csv(path, joints)
-    return [recording.track(chain) for chain in chains]
+    return BagTracks([recording.track(chain) for chain in chains])
 
 
 def _checked(instants: list[float], tracks: Sequence[ChainTrack]) -> list[float]:

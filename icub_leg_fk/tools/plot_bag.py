@@ -3,76 +3,50 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-import sys
+from tempfile import TemporaryDirectory
 
-from icub_leg_fk.errors import InputFileError, MissingDependencyError
+from icub_leg_fk.errors import InputFileError
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.ros.joint_input import JointInput
 from icub_leg_fk.ros.joint_stream import JointStream, OnReady
+from icub_leg_fk.tools.bag_reader import BagReader
+from icub_leg_fk.tools.bag_topics import JOINT_STATE
 from icub_leg_fk.tools.recording import ChainTrack
 import numpy as np
 
-JOINT_STATE = 'sensor_msgs/msg/JointState'
 DEFAULT_TOPIC = '/joint_states'
-
-
-def read_bag(path: Path, chains: Sequence[Chain], topic: str | None) -> list[ChainTrack]:
-    """Return what some chains did in a bag, those that have a pose at all.
-
-    Args:
-        path: directory of a rosbag2 bag, or one of its files (`.mcap`, `.db3`).
-        chains: the chains wanted.
-        topic: topic of the joint states; None for `/joint_states`, or the only one there is.
-
-    Raises:
-        InputFileError: the bag cannot be read, has no such topic, or no chain has a pose.
-        MissingDependencyError: rosbags is not installed.
-    """
-    rows = [_Rows() for _ in chains]
-    received = _Received()
-    joint_input = JointInput(chains, joint_timeout=0.5)
-    stream = JointStream(joint_input, now=lambda: received.ns)
-    stream.on_ready = [row.handler() for row in rows]
-    for received.ns, data in _joint_states(path, topic):
-        stream.feed(data)
-    stream.settle()
-    start = min((row.stamps[0] for row in rows if row.stamps), default=0)
-    tracks = [row.track(chain, start) for row, chain in zip(rows, chains, strict=True)
-              if row.stamps]
-    missing = [f'{chain.name} needs {", ".join(_unknown(joint_input, index))}'
-               for index, (row, chain) in enumerate(zip(rows, chains, strict=True))
-               if not row.stamps]
-    if not tracks:
-        raise InputFileError(f'{path}: found no pose in {joint_input.messages} joint states: '
-                             f'{"; ".join(missing)}')
-    for text in missing:
-        print(f'leg_fk: note: not drawn: {text}', file=sys.stderr)
-    return tracks
+JOINT_TIMEOUT = 0.5  # s, the node's default
 
 
 @dataclass
-class _Received:
-    """When the bag received the present message, for one without a stamp [ns]."""
+class BagTracks:
+    """What chains did in a bag.
 
-    ns: int = 0
+    Attributes:
+        tracks: one per chain that has a pose at all; times from the first pose on.
+        poseless: chains without a pose, and the joints that were missing.
+        damage: what of the bag could not be read.
+    """
+
+    tracks: list[ChainTrack] = field(default_factory=list)
+    poseless: list[str] = field(default_factory=list)
+    damage: list[str] = field(default_factory=list)
 
 
+@dataclass
 class _Rows:
     """The joint vectors of one chain, 8 bytes a number."""
 
-    def __init__(self) -> None:
-        self.stamps = array('q')
-        self.positions = array('d')
+    stamps: array[int] = field(default_factory=lambda: array('q'))
+    positions: array[float] = field(default_factory=lambda: array('d'))
 
     def handler(self) -> OnReady:
-        stamps, positions = self.stamps, self.positions
-
         def keep(sec: int, nanosec: int, q: Sequence[float], _: Sequence[float] | None) -> None:
-            stamps.append(sec * 1_000_000_000 + nanosec)
-            positions.extend(q)
+            self.stamps.append(sec * 1_000_000_000 + nanosec)
+            self.positions.extend(q)
         return keep
 
     def track(self, chain: Chain, start: int) -> ChainTrack:
@@ -80,43 +54,59 @@ class _Rows:
         return ChainTrack(chain, times, np.frombuffer(self.positions).reshape(len(times), -1))
 
 
-def _unknown(joint_input: JointInput, chain: int) -> list[str]:
+class _Clock:
+    """Knows when the bag received the present message, for one without a stamp [ns]."""
+
+    now = 0
+
+
+def read_bag(path: Path, chains: Sequence[Chain], topic: str | None) -> BagTracks:
+    """Return what some chains did in a bag.
+
+    Args:
+        path: directory of a rosbag2 bag, or one of its files.
+        chains: the chains wanted.
+        topic: topic of the joint states; None for `/joint_states`, or the only one there is.
+
+    Raises:
+        InputFileError: the bag cannot be read, has no such topic, or no chain has a pose.
+    """
+    clock, rows = _Clock(), [_Rows() for _ in chains]
+    stream = JointStream(JointInput(chains, JOINT_TIMEOUT), now=lambda: clock.now)
+    stream.on_ready = [row.handler() for row in rows]
+    with TemporaryDirectory() as scratch:
+        bag = BagReader(path, Path(scratch))
+        for block in bag.blocks(_joint_topics(bag, topic)):
+            for _, _, received, _, data in block:
+                clock.now = received
+                stream.feed(data)
+    joint_input = stream.settle()
+    start = min((row.stamps[0] for row in rows if row.stamps), default=0)
+    found = BagTracks(damage=bag.damage)
+    for index, (chain, row) in enumerate(zip(chains, rows, strict=True)):
+        if row.stamps:
+            found.tracks.append(row.track(chain, start))
+        else:
+            found.poseless.append(f'{chain.name} needs {_unknown(joint_input, index)}')
+    if not found.tracks:
+        raise InputFileError(f'{path}: found no pose in {joint_input.messages} joint states: '
+                             f'{"; ".join(found.poseless + found.damage)}')
+    return found
+
+
+def _joint_topics(bag: BagReader, wanted: str | None) -> list[int]:
+    """Return the indices of the topic to read the joint states from."""
+    known = sorted({topic.name for topic in bag.topics if topic.type == JOINT_STATE})
+    name = wanted or (DEFAULT_TOPIC if DEFAULT_TOPIC in known or len(known) != 1 else known[0])
+    if name not in known:
+        raise InputFileError(f'{bag.path}: found no joint states on {name}, allowed: '
+                             f'--joint-topic with one of {", ".join(known) or "(none there)"}')
+    return [index for index, topic in enumerate(bag.topics)
+            if (topic.name, topic.type) == (name, JOINT_STATE)]
+
+
+def _unknown(joint_input: JointInput, chain: int) -> str:
+    """Return what a chain without a pose lacked."""
     known = joint_input.known_joints(chain)
     names = [name for name in joint_input.chains[chain].joint_names if name not in known]
-    return names or ['joint positions that are finite and fresh']
-
-
-def _joint_states(path: Path, topic: str | None) -> Iterator[tuple[int, bytes]]:
-    """Yield when a JointState was received [ns], and its bytes."""
-    try:
-        from rosbags.rosbag2 import Reader
-    except ImportError as error:
-        raise MissingDependencyError('bags need rosbags: pip install rosbags') from error
-    count = 0
-    try:
-        with Reader(path) as reader:
-            chosen = _topic(path, [(c.topic, c.msgtype) for c in reader.connections], topic)
-            connections = [connection for connection in reader.connections
-                           if (connection.topic, connection.msgtype) == (chosen, JOINT_STATE)]
-            for _, received, data in reader.messages(connections):
-                yield received, bytes(data)
-                count += 1
-    except InputFileError:
-        raise
-    except Exception as error:  # rosbags lets those of sqlite, zstd and struct out
-        reason = ' '.join(str(error).split()) or type(error).__name__
-        if not count:
-            raise InputFileError(f'{path}: found no readable bag ({reason}), allowed: a rosbag2 '
-                                 'directory, or a .mcap or .db3 file') from error
-        print(f'leg_fk: note: {path} is damaged after {count} joint states ({reason}); '
-              'the rest is not drawn', file=sys.stderr)
-
-
-def _topic(path: Path, topics: Sequence[tuple[str, str]], wanted: str | None) -> str:
-    """Return the topic to read the joint states from."""
-    known = sorted({name for name, kind in topics if kind == JOINT_STATE})
-    topic = wanted or (DEFAULT_TOPIC if DEFAULT_TOPIC in known or len(known) != 1 else known[0])
-    if topic not in known:
-        raise InputFileError(f'{path}: found no joint states on {topic}, allowed: '
-                             f'--joint-topic with one of {", ".join(known) or "(none there)"}')
-    return topic
+    return ', '.join(names) or 'joint positions that are finite and fresh'
