@@ -199,9 +199,9 @@ class Robot:
             self.spin(0.02)
 
     def send(self, stamp, names=BOTH, positions=None, publisher=None, **fields):
-        """Publish a JointState with a stamp [ns]; positions default to 0.01, 0.02, ..."""
+        """Publish a JointState with a stamp [ns]; positions default to -0.01, -0.02, ..."""
         if positions is None:
-            positions = [0.01 * (i + 1) for i in range(len(names))]
+            positions = [-0.01 * (i + 1) for i in range(len(names))]
         message = JointState(name=list(names), position=[float(p) for p in positions], **fields)
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, SECOND)
         (publisher or self.joints).publish(message)
@@ -264,12 +264,14 @@ class Robot:
             inbox: inbox of /diagnostics.
             chain: name of the chain.
             condition: function of the status and its dictionary of values.
-            meanwhile: called again and again while waiting, such as to send joint states.
+            meanwhile: called every 10 ms while waiting, such as to send joint states.
         """
-        found, seen = [], []
+        found, seen, due = [], [], [0.0]
 
         def arrived():
-            meanwhile()
+            if time.monotonic() >= due[0]:
+                due[0] = time.monotonic() + 0.01
+                meanwhile()
             for array in inbox:
                 for status in array.status:
                     values = {item.key: item.value for item in status.values}

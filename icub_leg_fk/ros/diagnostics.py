@@ -6,11 +6,10 @@ from collections import Counter
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from icub_leg_fk.ros.joint_input import ChainCounts, MESSAGE_REASONS
+from icub_leg_fk.ros.joint_stream import JointStream
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-
-from icub_leg_fk.ros.joint_input import MESSAGE_REASONS, ChainCounts, JointInput
-from icub_leg_fk.ros.joint_stream import JointStream
 
 _PERIOD = 1.0  # s
 _WORDS = {
@@ -89,7 +88,9 @@ def _verdict(messages: int, rejected: Counter[str], counts: ChainCounts,
         return DiagnosticStatus.STALE, 'no JointState received'
     concerns = [f'{_WORDS[reason]}: {_listed(joints)}'
                 for reason, joints in sorted(counts.joints.items())]
-    concerns += [f'{count} messages {reason}' for reason, count in sorted(rejected.items())]
+    if rejected:
+        concerns.append('messages: ' + ', '.join(
+            f'{reason} {count}' for reason, count in sorted(rejected.items())))
     if counts.ready == 0:
         if missing and 'missing_joint' not in counts.joints:
             concerns.insert(0, f'missing: {", ".join(missing)}')

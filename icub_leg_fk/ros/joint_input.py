@@ -167,8 +167,11 @@ class JointInput:
         return counts
 
     def take_over(self, previous: JointInput) -> None:
-        """Go on with the joints and message counts of an input that this one replaces."""
+        """Go on with the joints and the counts of an input that this one replaces."""
         self.messages, self.counts = previous.messages, previous.counts
+        counts = {chain.name: previous.take_counts(index)
+                  for index, chain in enumerate(previous.chains)}
+        self.chain_counts = [counts.get(chain.name, ChainCounts()) for chain in self.chains]
         for name, slot in self._names.slots.items():
             if (old := previous._names.slots.get(name)) is not None:
                 self._stamps[slot] = previous._stamps[old]

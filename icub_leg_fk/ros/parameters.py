@@ -75,6 +75,7 @@ class NodeParameters:
         self.configuration = Configuration.from_parameters(self._values(), self._catalog)
         self._declaring = False
         self._candidate: tuple[Catalog, Configuration] | None = None
+        node.add_pre_set_parameters_callback(_with_typed_lists)
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._adopt)
 
@@ -135,9 +136,6 @@ class NodeParameters:
         ours = {change.name: change for change in changes if change.name in values
                 or change.name.endswith('.version')}
         for name, change in ours.items():
-            if change.type_ is Parameter.Type.NOT_SET:
-                return SetParametersResult(successful=False,
-                                           reason=f'parameter {name} cannot be deleted')
             values[name] = change.value
         if not ours:
             return SetParametersResult(successful=True)
@@ -163,6 +161,16 @@ class NodeParameters:
         self._declare_versions()
         self._declaring = False
         self._apply(self.configuration)
+
+
+def _with_typed_lists(changes: Sequence[Parameter]) -> list[Parameter]:
+    """Return the changes with an empty list of chains as one of strings.
+
+    An empty list says nothing of its type; rclpy sends it as bytes, ros2 param as booleans.
+    """
+    return [Parameter('chains', Parameter.Type.STRING_ARRAY, [])
+            if change.name == 'chains' and change.value in ([], b'') else change
+            for change in changes]
 
 
 def _kind(parameter: _Parameter) -> str:

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point
+from icub_leg_fk.kinematics import Chain
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
-
-from icub_leg_fk.kinematics import Chain
 
 _BONE_WIDTH = 0.012  # m
 _JOINT_DIAMETER = 0.03  # m
