@@ -136,9 +136,8 @@ def test_recorded_robot_can_be_played():
 
 
 @pytest.mark.parametrize(('version', 'foot_frame'), [('v1', 'dh'), ('v2_5', 'sole')])
-def test_poses_received_are_those_of_the_chains(monkeypatch, version, foot_frame):
+def test_poses_received_are_those_of_the_chains(version, foot_frame):
     """In the order of the messages, equal to the plain product of the DH matrices."""
-    monkeypatch.setenv('ROS_DOMAIN_ID', '45')
     catalog = Catalog.load()
     gait = walk(catalog, version, seconds=0.5)
     with Replay(gait, '/leg_fk_test', TIPS) as replay, \

@@ -1,5 +1,6 @@
 """`leg_fk plot`: pictures from CSV files and bags, what they show, and what is refused."""
 
+import os
 from pathlib import Path
 import re
 import subprocess
@@ -330,8 +331,9 @@ def test_missing_matplotlib_is_one_line(walking_csv):
     code = ("import sys; sys.modules['matplotlib'] = None\n"
             'from icub_leg_fk.tools.leg_fk import main\n'
             "sys.exit(main(['plot', 'walking.csv']))")
+    root = str(Path(__file__).parents[1])
     done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
-                          check=False)
+                          check=False, env={**os.environ, 'PYTHONPATH': root})
     assert done.returncode == 2
     assert done.stderr.count('\n') == 1
     assert 'matplotlib' in done.stderr
@@ -360,3 +362,43 @@ def test_pictures_of_the_documentation_can_be_made_anew(tmp_path):
     sizes = {path.name: path.stat().st_size for path in tmp_path.iterdir()}
     assert sizes.keys() == {'frames.png', 'legs.png', 'walking.png'}
     assert all(20_000 < size < 300_000 for size in sizes.values())
+
+
+ARM = """
+units: {length: m, angle: deg}
+chains:
+  arm:
+    tip: gripper
+    root_frame: base
+    joints: [column, lift]
+    tip_frames: {dh: {frame: gripper}}
+    versions:
+      v1:
+        T_Ro0: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+        links:
+          - {a: 2, d: 0, alpha: 0, offset: 0, range: [-90, 90]}
+          - {a: 0, d: 0, alpha: 0, offset: 0, range: [0, 1.5], type: prismatic}
+"""
+
+
+def test_other_robots_have_plain_axes_and_a_scale_that_fits(tmp_path):
+    (tmp_path / 'arm.yaml').write_text(ARM)
+    chain = Catalog.load(tmp_path / 'arm.yaml').chain('arm', 'v1')
+    track = ChainTrack(chain, np.arange(9.0), np.linspace((0, 0), (1, 2), 9))
+    figure = feet_figure([track], [0.0, 8.0], 'arm', [])
+    assert [panel.get_title() for panel in figure.axes[:3]] == [
+        'z  [m]', 'x  [m]', 'y  [m]']
+    assert np.allclose(figure.axes[1].lines[0].get_ydata(), 2 * np.cos(track.positions[:, 0]))
+    assert violations(track)[0].limit == '> 1.5 m'
+    texts = [text.get_text() for view in figure.axes[4:] for text in view.texts]
+    assert '2' in texts  # on the ruler
+    assert 'forward' not in texts
+
+
+def test_chains_of_several_roots_are_refused(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    other = ARM.partition('chains:')[2].replace('arm', 'leg').replace('base', 'hip')
+    Path('two.yaml').write_text(ARM + other.replace('gripper', 'foot'))
+    Path('two.csv').write_text('time,column,lift\n0,0,0\n')
+    assert main(['plot', 'two.csv', '-k', 'two.yaml', '--version', 'v1']) == 2
+    assert 'base, hip' in capsys.readouterr().err

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.tools import pictures_legs as legs
 from icub_leg_fk.tools import pictures_time as over_time
+from icub_leg_fk.tools.pictures_scene import Stage, TRAIL
 from icub_leg_fk.tools.pictures_style import (
     AXIS_COLORS,
     color_of,
@@ -23,9 +24,6 @@ import numpy as np
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.figure import Figure
-
-Sample = tuple[ChainTrack, int]
-TRAIL = 0.5  # s of a tip's path before and after an instant
 
 
 def feet_figure(tracks: Sequence[ChainTrack], instants: Sequence[float], title: str,
@@ -64,11 +62,12 @@ def feet_figure(tracks: Sequence[ChainTrack], instants: Sequence[float], title: 
     views = [legs.View(figure.add_subplot(spaces[i])) for i in range(len(instants))]
     scenes = [[(track, int(np.abs(track.times - instant).argmin())) for track in tracks]
               for instant in instants]
-    floor = _floor([sample for scene in scenes for sample in scene])
+    stage = Stage.around([sample for scene in scenes for sample in scene], soled)
     for view, scene, letter, instant in zip(views, scenes, over_time.letters(), instants):
-        _draw_scene(view, scene, floor, soled)
+        stage.draw(view, scene)
         view.axes.set_title(f'{letter}  {instant:.2f} s', x=0.04, y=0.93)
-    _share_limits(views)
+    stage.frame(views)
+    _axes_legend(figure, tracks, stage)
     return figure
 
 
@@ -96,8 +95,10 @@ def walk_figure(tracks: Sequence[ChainTrack], paths: Sequence[Array], title: str
     for ghost in np.searchsorted(times, times[row] + TRAIL / 5 * np.arange(-5, 0)):
         for track in tracks:
             legs.draw_leg(view, track.chain, track.positions[ghost], False, 4.0, alpha=0.14)
-    _draw_scene(view, scene, _floor(scene), soled)
-    _share_limits([view])
+    stage = Stage.around(scene, soled)
+    stage.draw(view, scene)
+    stage.frame([view])
+    _axes_legend(figure, tracks, stage)
     _draw_paths(figure, tracks, paths)
     return figure
 
@@ -128,44 +129,6 @@ def _draw_paths(figure: Figure, tracks: Sequence[ChainTrack], paths: Sequence[Ar
     panel.set_xlabel(f'forward  {MINUS}x  [m]')
 
 
-def _draw_scene(view: legs.View, scene: Sequence[Sample], floor: tuple[Array, Array],
-                soled: Collection[str]) -> None:
-    """Draw the chains as they are at an instant, their tips' paths around it, and the floor."""
-    reach = [track.chain.frames(track.positions[i])[:, :3, 3] for track, i in scene]
-    low = min(float(points[:, 2].min()) for points in reach)
-    xs, ys = floor
-    legs.draw_ground(view, low, xs, ys)
-    legs.draw_forward(view, (xs[0] + 0.16, ys[0], low))
-    legs.draw_ruler(view, xs[0], ys[-1], low)
-    legs.draw_triad(view, np.eye(4), 0.1, 2.4, 60, labels='xyz')
-    nearness = np.argsort(np.argsort([view.depth(points) for points in reach]))
-    for (track, i), rank in zip(scene, nearness, strict=True):
-        z = 10.0 + 10 * float(rank)
-        around = np.abs(track.times - track.times[i]) <= TRAIL
-        view.line(track.poses[around, :3], color=color_of(track.chain), linewidth=1.2, alpha=0.5,
-                  zorder=z - 1)
-        legs.draw_leg(view, track.chain, track.positions[i], track.chain.name in soled, z)
-        legs.draw_triad(view, track.chain.forward(track.positions[i]), 0.1, 2.2, z + 5)
-
-
-def _floor(samples: Sequence[Sample]) -> tuple[Array, Array]:
-    """Return x and y [m] of the lines of a floor that is under all chains."""
-    points = np.vstack([track.chain.frames(track.positions[i])[:, :2, 3] for track, i in samples])
-    lowest = np.minimum(points.min(axis=0) - (0.1, 0.03), (-0.2, -0.15))
-    highest = np.maximum(points.max(axis=0) + (0.05, 0.03), (0.2, 0.15))
-    return (legs.grid_lines(lowest[0], highest[0]), legs.grid_lines(lowest[1], highest[1]))
-
-
-def _share_limits(views: Sequence[legs.View]) -> None:
-    """Give all views one scale, that of the one that needs most room."""
-    boxes = np.array([view.axes.dataLim.extents for view in views])
-    left, bottom = boxes[:, :2].min(axis=0) - (0.06, 0.04)
-    right, top = boxes[:, 2:].max(axis=0) + (0.01, 0.13)
-    for view in views:
-        view.axes.set_xlim(left, right)
-        view.axes.set_ylim(bottom, top)
-
-
 def _title(figure: Figure, title: str, tracks: Sequence[ChainTrack]) -> None:
     """Write the title, and below it what colours mean and what else is worth knowing."""
     figure.text(0.03, 0.955, title, fontsize=19, weight='bold', va='center')
@@ -175,10 +138,15 @@ def _title(figure: Figure, title: str, tracks: Sequence[ChainTrack]) -> None:
         notes.append('all joints inside their documented ranges')
     words += [(note, FAINT) for note in notes if note]
     _write_in_colors(figure, 0.03, words)
+
+
+def _axes_legend(figure: Figure, tracks: Sequence[ChainTrack], stage: Stage) -> None:
+    """Write whose axes are drawn, and how large the floor's squares are."""
     frames = ', '.join(track.chain.tip_frame for track in tracks)
     _write_in_colors(figure, 0.56, [
         *((name, color) for name, color in zip('xyz', AXIS_COLORS, strict=True)),
-        (f'of {tracks[0].chain.root_frame}, {frames}', INK), ('squares 0.1 m', FAINT)], 10.5)
+        (f'of {tracks[0].chain.root_frame}, {frames}', INK),
+        (f'squares {stage.step:g} m', FAINT)], 10.5)
 
 
 def _write_in_colors(figure: Figure, x: float, words: Sequence[tuple[str, str]],

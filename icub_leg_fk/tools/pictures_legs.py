@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-GRID_STEP = 0.1  # m
 SOLE_BOX = (-0.05, 0.11, -0.037, 0.037)  # m; back, front, right and left of the sole, for the eye
 _HALO = 2.5  # points of white around lines, so that the nearer one is seen to be nearer
 
@@ -151,10 +150,9 @@ def draw_ground(view: View, height: float, xs: Array, ys: Array) -> None:
                   zorder=1)
 
 
-def grid_lines(low: float, high: float) -> Array:
-    """Return the grid's lines that take in a range [m]."""
-    first, last = math.floor(low / GRID_STEP), math.ceil(high / GRID_STEP)
-    return np.arange(first, last + 1, dtype=float) * GRID_STEP
+def grid_lines(low: float, high: float, step: float = 0.1) -> Array:
+    """Return the lines of a grid that take in a range [m]."""
+    return np.arange(math.floor(low / step), math.ceil(high / step) + 1, dtype=float) * step
 
 
 def draw_forward(view: View, point: Sequence[float], length: float = 0.14, text: str = 'forward'
@@ -165,12 +163,20 @@ def draw_forward(view: View, point: Sequence[float], length: float = 0.14, text:
     view.text(end, text, (0, -9), fontsize=10, zorder=3)
 
 
-def draw_ruler(view: View, x: float, y: float, low: float, high: float = 0.0) -> None:
-    """Draw an upright ruler at x, y [m] with heights in the root frame, every 0.2 m."""
-    view.line([(x, y, low), (x, y, high)], color=FAINT, linewidth=1, zorder=2)
-    tick = view.project((x, y, low))[0]
-    for value in np.arange(math.ceil(low * 5 - 1e-9), math.floor(high * 5 + 1e-9) + 1) / 5:
-        at = view.project((x, y, value))
-        view.axes.plot([tick - 0.008, tick], [at[1]] * 2, color=FAINT, linewidth=1, zorder=2)
-        text = f'{value:.1f}'.replace('-', MINUS) if value else 'z  0.0 m'
+def draw_ruler(view: View, foot: Sequence[float], top: float, step: float) -> None:
+    """Draw an upright ruler with heights in the root frame.
+
+    Args:
+        view: where.
+        foot: (3,) its lower end [m].
+        top: height of its upper end [m].
+        step: half the way from mark to mark [m].
+    """
+    x, y, low = foot
+    view.line([(x, y, low), (x, y, top)], color=FAINT, linewidth=1, zorder=2)
+    first, last = math.ceil(low / (2 * step) - 1e-9), math.floor(top / (2 * step) + 1e-9)
+    for value in (np.arange(first, last + 1) * 2 * step).tolist():
+        right, up = view.project((x, y, value)).tolist()
+        view.axes.plot([right - 0.08 * step, right], [up, up], color=FAINT, linewidth=1, zorder=2)
+        text = f'{value:.4g}'.replace('-', MINUS) if abs(value) > step else 'z  0 m'
         view.text((x, y, value), text, (-8, 0), ha='right', fontsize=9)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 FORMATS = ('.png', '.svg', '.pdf')
 AXIS_COLORS = ('#d62728', '#2ca02c', '#1f5fd0')  # x red, y green, z blue, as documented
 LEFT, RIGHT = '#6a3d9a', '#e08214'  # told apart in every kind of colour vision, and from the axes
-OTHERS = ('#00798c', '#8c6d31', '#7f7f7f')
+OTHERS = ('#00798c', '#8c6d31', '#a8437c')
 INK, FAINT, GRID = '#222222', '#8a8a8a', '#e4e4e4'
 MINUS = '\N{MINUS SIGN}'  # as wide as the plus, and as matplotlib writes it
 SLIDE = (13.333, 7.5)  # inches, 16:9
@@ -40,6 +40,11 @@ def color_of(chain: Chain) -> str:
         if word in chain.tip or word in chain.name:
             return color
     return OTHERS[sum(map(ord, chain.name)) % len(OTHERS)]
+
+
+def has_known_axes(chain: Chain) -> bool:
+    """Tell whether the chain's root is known to have x backward, y to the right and z up."""
+    return chain.root_frame == 'root_link'
 
 
 def label_of(chain: Chain) -> str:

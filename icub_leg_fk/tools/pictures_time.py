@@ -9,7 +9,7 @@ import math
 from typing import TYPE_CHECKING
 
 from icub_leg_fk.kinematics.rotation import Array
-from icub_leg_fk.tools.pictures_style import color_of, INK, label_of, MINUS
+from icub_leg_fk.tools.pictures_style import color_of, has_known_axes, INK, label_of, MINUS
 from icub_leg_fk.tools.recording import ChainTrack
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# The root frame of these robots: x backward, y to the robot's right, z up.
-COORDINATES = (('height  z  [m]', 2, 1.0), (f'forward  {MINUS}x  [m]', 0, -1.0),
-               (f'left  {MINUS}y  [m]', 1, -1.0))
+_ICUB_COORDINATES = (('height  z  [m]', 2, 1.0), (f'forward  {MINUS}x  [m]', 0, -1.0),
+                     (f'left  {MINUS}y  [m]', 1, -1.0))
+_COORDINATES = (('z  [m]', 2, 1.0), ('x  [m]', 0, 1.0), ('y  [m]', 1, 1.0))
 GAP_INTERVALS = 5.0  # so many usual intervals without a pose are a gap
 _BINS = 3000  # of a curve; more cannot be seen, and make vector files huge
 
@@ -61,7 +61,8 @@ def all_gaps(tracks: Sequence[ChainTrack]) -> list[tuple[float, float]]:
 def draw_tips(axes: Sequence[Axes], tracks: Sequence[ChainTrack]) -> None:
     """Draw one coordinate of every tip against time into each of three axes."""
     start, end = time_span(tracks)
-    for panel, (label, column, sign) in zip(axes, COORDINATES, strict=True):
+    coordinates = _ICUB_COORDINATES if has_known_axes(tracks[0].chain) else _COORDINATES
+    for panel, (label, column, sign) in zip(axes, coordinates, strict=True):
         for track in tracks:
             curve = _curve(track.times, sign * track.poses[:, column])
             panel.plot(*curve, color=color_of(track.chain), label=label_of(track.chain),

@@ -74,6 +74,10 @@ def run(args: argparse.Namespace) -> int:
                              'file')
     catalog = Catalog.load(args.kinematics_file)
     chains = chosen_chains(catalog, args.chains, args.version, args.foot_frame)
+    roots = {chain.root_frame for chain in chains}
+    if len(roots) > 1:
+        raise LegFKError(f'--chains: found the root frames {", ".join(sorted(roots))}, allowed: '
+                         'chains of one root frame')
     found = _read(args.input, chains, args.joint_topic)
     tracks = found.tracks
     instants = _checked(args.at, tracks) if args.at else telling_instants(tracks)
