@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
+import os
 from pathlib import Path
 import re
+import shutil
 from typing import NamedTuple
 
 from icub_leg_fk.errors import InputFileError
 from icub_leg_fk.tools.bag_codecs import decompress, decompress_file, ZSTD_MAGIC
 from icub_leg_fk.tools.bag_mcap_reader import McapFile
 from icub_leg_fk.tools.bag_metadata import OldMetadata, read_metadata
-from icub_leg_fk.tools.bag_sqlite_reader import SqliteFile
+from icub_leg_fk.tools.bag_sqlite_reader import SqliteFile, torn_bytes
 from icub_leg_fk.tools.bag_topics import Message, Topic
 
 KINDS: Mapping[str, tuple[str, type[McapFile] | type[SqliteFile]]] = {
@@ -91,8 +93,7 @@ class BagReader:
                     yield self._uncompressed(block)
                 self._blame(file.path, found + storage.damage)
             finally:
-                if file.compressed:
-                    plain.unlink(missing_ok=True)
+                self._clear_scratch()
             before += size
         if self._undecodable:
             self.damage.append(f'{self._undecodable} messages have damaged zstd data')
@@ -139,8 +140,7 @@ class BagReader:
         try:
             storage = KINDS[ending][1](plain)
         finally:
-            if compressed:
-                plain.unlink(missing_ok=True)
+            self._clear_scratch()
         if not storage.topics:
             self._blame(path, storage.damage)
         self.attachments += storage.attachments
@@ -167,13 +167,23 @@ class BagReader:
                                                   definition=like.definition))
 
     def _plain(self, path: Path, compressed: bool, damage: list[str]) -> Path:
-        """Return a file to read, decompressed if need be."""
-        if not compressed:
-            return path
-        plain = self._scratch / path.stem
-        if problem := decompress_file(path, plain):
-            damage.append(problem)
+        """Return a file to read: decompressed, and without a torn page at its end."""
+        plain = path
+        if compressed:
+            plain = self._scratch / path.stem
+            if problem := decompress_file(path, plain):
+                damage.append(problem)
+        if plain.suffix == '.db3' and (torn := torn_bytes(plain)):
+            damage.append('is cut off')
+            whole = self._scratch / f'whole_{plain.name}'
+            shutil.copyfile(plain, whole)
+            os.truncate(whole, plain.stat().st_size - torn)
+            plain = whole
         return plain
+
+    def _clear_scratch(self) -> None:
+        for file in self._scratch.iterdir():
+            file.unlink()
 
     def _uncompressed(self, block: list[Message]) -> list[Message]:
         """Return messages that may each be compressed, as only the metadata can tell, plain."""

@@ -52,7 +52,8 @@ def summary_lines(source: Path, summary: Summary) -> list[str]:
     """Return the closing summary, line by line."""
     rows = [(str(summary.copied), 'messages copied')]
     rows += [(str(count), f'added on {topic}') for topic, count in summary.added.items()]
-    rows += [(str(count), f'joint states rejected: {reason}')
+    rows += [(str(count), 'time steps back: held joints forgotten' if reason == 'time_jump'
+              else f'joint states rejected: {reason}')
              for reason, count in summary.rejected.items()]
     rows += [(str(count), f'joint states gave no {_what(reason)} of {chain}: {reason} ({joints})')
              for chain, reasons in summary.held_back.items()

@@ -12,6 +12,7 @@ from icub_leg_fk.tools.bag_topics import Message, Topic
 
 _BLOCK = 1 << 20  # bytes
 _ROWS = 4096
+_MAGIC = b'SQLite format 3\x00'
 _FIRST_LEAP = 1_000_000  # ns
 _TOO_FAR = 1 << 60
 _COLUMNS = 'SELECT topic_id, timestamp, id, data FROM messages'
@@ -63,6 +64,8 @@ class SqliteFile:
         log = Path(f'{self.path}-wal')
         access = 'mode=ro' if log.exists() and log.stat().st_size else 'immutable=1'
         database = sqlite3.connect(f'file:{quote(str(self.path))}?{access}', uri=True)
+        # Without this, sqlite refuses a file that is shorter than its header says.
+        database.execute('PRAGMA writable_schema = ON')
         database.text_factory = lambda data: data.decode('utf-8', 'replace')
         return database
 
@@ -117,6 +120,19 @@ class SqliteFile:
             self.damage.append(f'{odd} messages have no topic or no data')
         if block:
             yield block
+
+
+def torn_bytes(path: Path) -> int:
+    """Return how many bytes of a page that is cut off stand at the end of a file.
+
+    Of such a page sqlite would take the missing part for zeros, and so give false messages.
+    """
+    with path.open('rb') as file:
+        header = file.read(18)
+    page_size = int.from_bytes(header[16:], 'big')
+    if page_size == 1:  # as the file format puts it
+        page_size = 65536
+    return path.stat().st_size % page_size if header.startswith(_MAGIC) and page_size else 0
 
 
 def _first_time(database: sqlite3.Connection) -> int:
