@@ -54,6 +54,9 @@ class Outputs:
         if configuration.publish_markers:
             from visualization_msgs.msg import MarkerArray
             topics['~/skeleton'] = MarkerArray
+        if (skeleton := self._publishers.get('~/skeleton')) is not None:
+            from icub_leg_fk.ros.skeleton import no_skeletons
+            skeleton.publish(no_skeletons())
         for topic in self._publishers.keys() - topics.keys():
             self._node.destroy_publisher(self._publishers.pop(topic))
         for topic, message_type in topics.items():

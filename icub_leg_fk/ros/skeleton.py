@@ -35,6 +35,11 @@ def skeleton_markers(chain: Chain, q: Sequence[float], stamp: Time,
     return MarkerArray(markers=[bones, joints])
 
 
+def no_skeletons() -> MarkerArray:
+    """Return what makes a viewer forget every skeleton, such as those of chains now dropped."""
+    return MarkerArray(markers=[Marker(action=Marker.DELETEALL)])
+
+
 def _marker(chain: Chain, stamp: Time, frame_prefix: str, number: int, kind: int, size: float,
             color: ColorRGBA) -> Marker:
     marker = Marker(ns=chain.name, id=number, type=kind, action=Marker.ADD, color=color)

@@ -1,0 +1,210 @@
+"""Twists, skeletons and transforms that the node publishes on request."""
+
+from geometry_msgs.msg import TwistStamped
+from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.tools.gait import walk
+from node_harness import BOTH, FEET, LOSSLESS, NodeProcess, Robot, SECOND
+from node_oracle import oracle_jacobian, oracle_pose, pose_matrix
+import numpy as np
+import pinocchio as pin
+import pytest
+from recorded_walk import needs_recorded_walk, read_recorded_walk
+from visualization_msgs.msg import Marker, MarkerArray
+
+MS = 1_000_000  # ns
+RATE = 100  # Hz
+Q = np.array([0.2, 0.1, -0.1, -0.5, -0.3, 0.1, 0.15, 0.05, 0.1, -0.4, -0.2, -0.1])
+CHAINS = dict(zip(FEET, (('left_leg', slice(6)), ('right_leg', slice(6, 12))), strict=True))
+
+
+class Twists:
+    """A robot beside a node that publishes twists."""
+
+    def __init__(self, node, robot):
+        self.node, self.robot = node, robot
+        self.inboxes = {tip: robot.listen(TwistStamped, node.topic(f'{tip}/twist'))
+                        for tip in FEET}
+        self.stamp = SECOND
+        while not all(self.inboxes.values()):
+            self.send(Q, np.zeros(12))
+        self.settle()
+
+    def send(self, q, qdot, names=BOTH):
+        self.stamp += MS
+        self.robot.send(self.stamp, names, q, velocity=[float(value) for value in qdot])
+        self.robot.spin(0.02)
+
+    def settle(self):
+        """Wait for the answers to the last message and empty all inboxes."""
+        poses = {tip: self.robot.take(self.robot.poses[tip], self.stamp) for tip in FEET}
+        return poses, {tip: self.robot.take(self.inboxes[tip], self.stamp) for tip in FEET}
+
+
+@pytest.fixture(scope='module')
+def twists():
+    """Return a robot beside a node that publishes twists."""
+    deep = {f'qos_overrides.{{ns}}/foot_pose_publisher/{tip}/twist.publisher.depth': 5000
+            for tip in FEET}
+    with NodeProcess({'publish_twist': True, **LOSSLESS, **deep}) as node, Robot(node) as robot:
+        yield Twists(node, robot)
+
+
+def vector(twist):
+    linear, angular = twist.twist.linear, twist.twist.angular
+    return np.array([linear.x, linear.y, linear.z, angular.x, angular.y, angular.z])
+
+
+def test_twist_is_the_jacobian_times_the_velocities(twists):
+    random = np.random.default_rng(7)
+    for _ in range(20):
+        q, qdot = random.uniform(-1, 1, 12), random.uniform(-5, 5, 12)
+        order = random.permutation(12)
+        twists.send(q[order], qdot[order], [BOTH[i] for i in order])
+        poses, answers = twists.settle()
+        for tip, (chain, part) in CHAINS.items():
+            assert answers[tip].stamps() == poses[tip].stamps() == [twists.stamp]
+            assert answers[tip][0].header.frame_id == 'root_link'
+            np.testing.assert_allclose(
+                vector(answers[tip][0]), oracle_jacobian(chain, 'v2_5', q[part]) @ qdot[part],
+                rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize('qdot', [[], [0.1] * 11, [0.1] * 11 + [np.nan], [np.inf] + [0.1] * 11],
+                         ids=['none', 'short', 'nan', 'inf'])
+def test_no_twist_without_all_velocities_but_the_pose_goes_out(twists, qdot):
+    twists.send(Q, qdot)
+    bad = twists.stamp
+    twists.send(Q, np.ones(12))
+    poses, answers = twists.settle()
+    for tip in FEET:
+        assert poses[tip].stamps() == [bad, twists.stamp]
+    whole = len(qdot) == 12
+    assert (bad in answers['left_foot'].stamps()) == (whole and np.isfinite(qdot[:6]).all())
+    assert (bad in answers['right_foot'].stamps()) == (whole and np.isfinite(qdot[6:]).all())
+
+
+def check_against_differences(twists, positions, velocities, linear, angular):
+    """Check twists against central differences of the poses that come with them.
+
+    Args:
+        twists: the robot and its inboxes.
+        positions: (N, 12) joint positions [rad], at RATE.
+        velocities: (N, 12) joint velocities [rad/s].
+        linear: greatest difference allowed [m/s].
+        angular: greatest difference allowed [rad/s].
+    """
+    for q, qdot in zip(positions, velocities, strict=True):
+        twists.send(q, qdot)
+    poses, answers = twists.settle()
+    for tip in FEET:
+        T = np.array([pose_matrix(message.pose) for message in poses[tip]])
+        found = np.array([vector(message) for message in answers[tip]])
+        assert len(T) == len(found) == len(positions)
+        p, R = T[:, :3, 3], T[:, :3, :3]
+        expected = np.hstack((
+            (p[2:] - p[:-2]) * RATE / 2,
+            [pin.log3(b @ a.T) * RATE / 2 for a, b in zip(R, R[2:])]))
+        error = np.abs(found[1:-1] - expected).max(axis=0)
+        assert np.abs(expected).max() > 10 * error.max()  # the robot does move
+        assert error[:3].max() < linear
+        assert error[3:].max() < angular
+
+
+def test_twist_is_the_derivative_of_the_pose_on_a_walk(twists):
+    gait = walk(Catalog.load(), 'v2_5', seconds=2.0, rate=RATE)
+    check_against_differences(twists, gait.positions, gait.velocities, 0.01, 0.02)
+
+
+@needs_recorded_walk
+def test_twist_is_the_derivative_of_the_pose_on_the_recorded_walk(twists):
+    names, times, recorded, _ = read_recorded_walk()
+    assert tuple(names) == BOTH
+    even = np.arange(4.0, 8.0, 1 / RATE)  # s, in the midst of the walk
+    positions = np.array([np.interp(even, times, column) for column in recorded.T]).T
+    window = np.hanning(9)[1:-1]  # 70 ms, against the encoders' steps
+    window /= window.sum()
+    smooth = np.array([np.convolve(column, window, 'valid') for column in positions.T]).T
+    velocities = np.gradient(smooth, 1 / RATE, axis=0)
+    check_against_differences(twists, smooth[1:-1], velocities[1:-1], 0.01, 0.02)
+
+
+def test_frame_prefix_holds_for_twists_and_topics_go_when_they_are_switched_off(twists):
+    robot, node = twists.robot, twists.node
+    assert robot.set(frame_prefix='a/').successful
+    twists.send(Q, np.ones(12))
+    _, answers = twists.settle()
+    assert answers['left_foot'][0].header.frame_id == 'a/root_link'
+    topic = node.topic('left_foot/twist')
+    assert robot.node.count_publishers(topic) == 1
+    assert robot.set(publish_twist=False, frame_prefix='').successful
+    robot.until(lambda: robot.node.count_publishers(topic) == 0, 'the twist topic to go')
+
+
+def test_skeletons_go_through_the_frames_of_each_leg():
+    with NodeProcess({'publish_markers': True, 'frame_prefix': 'x/', 'foot_frame': 'sole'}) \
+            as node, Robot(node) as robot:
+        inbox = []
+        robot.node.create_subscription(MarkerArray, node.topic('skeleton'), inbox.append, 10)
+        robot.until(lambda: robot.send(SECOND, BOTH, Q) or len(inbox) >= 2, 'skeletons')
+        by_chain = {array.markers[0].ns: array.markers for array in inbox}
+        assert set(by_chain) == {'left_leg', 'right_leg'}
+        for chain, part in CHAINS.values():
+            frames = Catalog.load().chain(chain, 'v2_5', 'sole').frames(Q[part])
+            for marker in by_chain[chain]:
+                assert marker.header.frame_id == 'x/root_link'
+                assert (marker.header.stamp.sec, marker.header.stamp.nanosec) == (1, 0)
+                assert (marker.action, marker.color.a) == (Marker.ADD, 1.0)
+                points = np.array([[point.x, point.y, point.z] for point in marker.points])
+                np.testing.assert_allclose(points[1:], frames[:, :3, 3], rtol=0, atol=1e-12)
+                np.testing.assert_allclose(
+                    points[-1], oracle_pose(chain, 'v2_5', Q[part]).translation, atol=1e-12)
+                assert not points[0].any()
+            assert [marker.type for marker in by_chain[chain]] == [Marker.LINE_STRIP,
+                                                                   Marker.SPHERE_LIST]
+        # Viewers forget the skeletons of chains that are dropped.
+        robot.spin()
+        inbox.clear()
+        assert robot.set(chains=['right_leg']).successful
+        robot.until(lambda: any(array.markers[0].action == Marker.DELETEALL for array in inbox),
+                    'removal of the skeletons')
+
+
+def test_transforms_are_refused_in_one_line_where_tf2_ros_is_missing(twists):
+    try:
+        import tf2_ros
+    except ImportError:
+        result = twists.robot.set(publish_tf=True)
+        assert not result.successful
+        assert 'tf2_ros' in result.reason
+        assert '\n' not in result.reason
+    else:
+        pytest.skip(f'tf2_ros is there: {tf2_ros.__file__}')
+
+
+@pytest.mark.parametrize('foot_frame, children', [
+    ('dh', ['l_foot_dh_frame', 'r_foot_dh_frame']), ('sole', ['l_sole', 'r_sole'])])
+def test_transforms_are_those_of_the_poses(foot_frame, children):
+    pytest.importorskip('tf2_ros', reason='tf2_ros is not installed, nothing can be broadcast')
+    from tf2_msgs.msg import TFMessage
+    parameters = {'publish_tf': True, 'frame_prefix': 'x/', 'foot_frame': foot_frame}
+    with NodeProcess(parameters) as node, Robot(node) as robot:
+        inbox = []
+        robot.node.create_subscription(TFMessage, '/tf', inbox.append, 10)
+        robot.until(lambda: robot.send(SECOND, BOTH, Q) or len(inbox) >= 2, 'transforms')
+        found = {message.transforms[0].child_frame_id: message.transforms[0] for message in inbox}
+        for child, (chain, part) in zip(children, CHAINS.values(), strict=True):
+            transform = found[f'x/{child}']
+            assert transform.header.frame_id == 'x/root_link'
+            assert transform.header.stamp.sec == 1
+            np.testing.assert_allclose(
+                pose_matrix(transform.transform),
+                oracle_pose(chain, 'v2_5', Q[part], foot_frame).homogeneous, rtol=0, atol=1e-12)
+
+
+def test_no_other_topic_is_offered_unless_asked_for():
+    with NodeProcess(LOSSLESS) as node, Robot(node) as robot:
+        robot.connect()
+        offered = dict(robot.node.get_publisher_names_and_types_by_node(
+            'foot_pose_publisher', node.namespace))
+        own = {topic for topic in offered if topic.startswith(node.topic(''))}
+        assert own == {node.topic(f'{tip}/pose') for tip in FEET}
