@@ -164,6 +164,26 @@ def test_lost_poses_are_told_and_exit_1(capsys):
     assert '2 did not arrive' in captured.err
 
 
+def test_no_pose_at_all_is_told_and_exit_1(capsys):
+    recording = walk(Catalog.load(), 'v2_5', seconds=0.1)
+    answers = [Answers(tip, np.full((10, 7), np.nan), np.full(10, np.nan)) for tip in TIPS]
+    assert conclude(recording, answers, Path('demo.png')) == 1
+    captured = capsys.readouterr()
+    assert re.search(r'lost +20\n', captured.out)
+    assert re.search(r'picture +none\n', captured.out)
+    assert captured.err.count('\n') == 1
+
+
+def test_nohup_is_respected():
+    """A demonstration that was told to ignore SIGHUP goes on."""
+    process = subprocess.Popen(['nohup', *DEMO, '--seconds', '2'], stdout=subprocess.PIPE,
+                               stderr=subprocess.DEVNULL, text=True)
+    read_until(process.stdout, 'right foot: ')
+    process.send_signal(signal.SIGHUP)
+    process.communicate(timeout=30)
+    assert process.returncode == 0
+
+
 def test_node_that_refuses_its_parameters_is_one_line():
     with pytest.raises(NodeError, match=r'exit status 1: .*v9.*v2_5'), \
             NodeProcess('/leg_fk_test', {'version': 'v9'}) as node:

@@ -112,12 +112,15 @@ def _play(args: argparse.Namespace, recording: JointRecording, chains: Sequence[
 
 def _draw(output: Path, source: str, recording: JointRecording, chains: Sequence[Chain],
           answers: Sequence[Answers]) -> None:
+    """Draw what has arrived, if something has of each foot."""
     from icub_leg_fk.tools.pictures import walk_figure
     from icub_leg_fk.tools.pictures_style import save_picture
     import numpy as np
 
     tracks = [recording.track(chain) for chain in chains]
     paths = [answer.poses[np.isfinite(answer.latencies)] for answer in answers]
+    if not all(map(len, paths)):
+        return
     title = f'{source}   {chains[0].version}'
     save_picture(lambda: walk_figure(tracks, paths, title, CHAINS), output)
 
@@ -131,13 +134,14 @@ def conclude(recording: JointRecording, answers: Sequence[Answers], output: Path
     lost = sent * len(answers) - arrived
     unasked = sum(answer.unasked for answer in answers)
     latencies = np.concatenate([answer.latencies for answer in answers]) * 1e3
-    median, p99, largest = np.nanpercentile(latencies, (50, 99, 100)) if arrived else [np.nan] * 3
+    latency = 'none' if not arrived else 'median {:.2f} ms   p99 {:.2f} ms   max {:.2f} ms'.format(
+        *np.nanpercentile(latencies, (50, 99, 100)))
     duration = recording.times[-1] - recording.times[0]
     print(f'\nmessages in   {sent}  in {duration:.2f} s\n'
           f'poses out     {arrived}  ({", ".join(f"{a.tip} {a.arrived}" for a in answers)})\n'
           f'lost          {lost or "none"}\n'
-          f'latency       median {median:.2f} ms   p99 {p99:.2f} ms   max {largest:.2f} ms\n'
-          f'picture       {output}', flush=True)
+          f'latency       {latency}\n'
+          f'picture       {output if all(a.arrived for a in answers) else "none"}', flush=True)
     if lost or unasked:
         print(f'leg_fk: error: of {sent * len(answers)} poses {lost} did not arrive, and '
               f'{unasked} arrived that belong to no message', file=sys.stderr)

@@ -67,8 +67,8 @@ def draw_tips(axes: Sequence[Axes], tracks: Sequence[ChainTrack]) -> None:
             curve = _curve(track.times, sign * track.poses[:, column])
             panel.plot(*curve, color=color_of(track.chain), label=label_of(track.chain),
                        marker='o' if len(track.times) < 3 else '')
-        for gap in all_gaps(tracks):
-            panel.axvspan(*gap, color='#000000', alpha=0.12, linewidth=0)
+        panel.broken_barh([(a, b - a) for a, b in all_gaps(tracks)], (0, 1), color='#000000',
+                          alpha=0.12, linewidth=0, transform=panel.get_xaxis_transform())
         panel.set_title(label)
         panel.set_xlim(start, end)
         panel.margins(y=0.12)
