@@ -70,6 +70,7 @@ def _run(stop: _StopSignals, argv: list[str]) -> int:
         import rclpy
         from rclpy.logging import LoggingSeverity, set_logger_level
         from rclpy.signals import SignalHandlerOptions
+        from rclpy.task import Future
         from rclpy.utilities import remove_ros_args
     except ImportError as error:
         return _refuse(f'rclpy cannot be imported ({error}); source ROS 2, or install '
@@ -93,7 +94,8 @@ def _run(stop: _StopSignals, argv: list[str]) -> int:
         except (LegFKError, *START_ERRORS) as error:
             return _refuse(str(error))
         while rclpy.ok() and not stop.requested:
-            executor.spin_once(timeout_sec=_SPIN_PERIOD)
+            # Unlike spin_once, this takes message after message without coming back in between.
+            executor.spin_until_future_complete(Future(), timeout_sec=_SPIN_PERIOD)
     finally:
         rclpy.try_shutdown()
     return 0
