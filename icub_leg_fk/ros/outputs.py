@@ -98,7 +98,7 @@ class Outputs:
     def _handler(self, index: int, chain: Chain, configuration: Configuration) -> OnReady | None:
         steps: list[OnReady] = []
         if self._wanted(topic := f'~/{chain.tip}/pose'):
-            steps.append(self._pose_step(chain, configuration, self._publishers[topic].publish))
+            steps.append(self._pose_step(chain, configuration, _sender(self._publishers[topic])))
         if self._wanted(topic := f'~/{chain.tip}/twist'):
             steps.append(self._twist_step(index, chain, configuration,
                                           self._publishers[topic].publish))
@@ -121,13 +121,13 @@ class Outputs:
         return restamped
 
     def _pose_step(self, chain: Chain, configuration: Configuration,
-                   publish: Callable[[bytes], None]) -> OnReady:
+                   send: Callable[[bytes], None]) -> OnReady:
         encode = PoseStampedEncoder(configuration.frame_prefix + chain.root_frame).encode
         pose = chain.pose
 
         def publish_pose(sec: int, nanosec: int, q: Sequence[float],
                          qdot: Sequence[float] | None) -> None:
-            publish(encode(sec, nanosec, pose(q)))
+            send(encode(sec, nanosec, pose(q)))
         return publish_pose
 
     def _twist_step(self, index: int, chain: Chain, configuration: Configuration,
@@ -172,6 +172,12 @@ class Outputs:
             publish(skeleton_markers(chain, q, Time(sec=sec, nanosec=nanosec),
                                      configuration.frame_prefix))
         return publish_skeleton
+
+
+def _sender(publisher: Publisher) -> Callable[[bytes], None]:
+    """Return what sends serialized messages: `publish` without its checks, where rclpy has it."""
+    send: Callable[[bytes], None] = getattr(publisher.handle, 'publish_raw', publisher.publish)
+    return send
 
 
 def _all_of(steps: Sequence[OnReady]) -> OnReady:
