@@ -1,0 +1,250 @@
+"""A robot that behaves badly: joint states at a fixed rate, with a new fault every few seconds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import itertools
+import math
+import random
+import struct
+import time
+from typing import Any
+
+from bench.load import joint_positions, ROBOT_JOINTS
+from bench.soak_ledger import Ledger, Promise
+from geometry_msgs.msg import PoseStamped
+from icub_leg_fk.kinematics import Catalog
+import rclpy
+from rclpy.duration import Duration
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.parameter_client import AsyncParameterClient
+from rclpy.qos import QoSProfile
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
+
+FEET = {'left_foot': 'left_leg', 'right_foot': 'right_leg'}
+DEPTH = 20_000
+SAMPLES = 100  # of the gait
+SECOND = 1_000_000_000  # ns
+VERSIONS, FOOT_FRAMES = ('v1', 'v2_5', 'v3'), ('dh', 'sole')
+CHECKED = 50  # every so many poses one is computed anew
+_CATCH_UP = 0.01  # s; what is later than that is not made up for
+_STAMP = struct.Struct('<iI')
+_STAMP_AT = 4
+_POSE = struct.Struct('<7d')
+_BOTH, _LEFT, _RIGHT, _NONE = (True, True), (True, False), (False, True), (False, False)
+
+
+class SoakRobot:
+    """Sends joint states, knows what poses they promise, and takes in what comes.
+
+    Args:
+        namespace: namespace of the node under test.
+        rate: messages per second [Hz].
+
+    Attributes:
+        ledgers: by foot.
+        latencies: of every tenth pose since they were last taken [us].
+        sent: messages sent.
+        faults: how often each fault was done.
+        complaints: what else was not as it has to be.
+    """
+
+    def __init__(self, namespace: str, rate: float) -> None:
+        rclpy.init(signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
+        self._node = Node('robot', namespace=namespace)
+        self._executor = EventsExecutor()
+        self._executor.add_node(self._node)
+        self._qos = QoSProfile(depth=DEPTH)
+        self._publisher = self._node.create_publisher(JointState, 'joint_states', self._qos)
+        self._client = AsyncParameterClient(self._node, 'foot_pose_publisher')
+        self._bystander: Any = None
+        self._messages = _messages(random.Random(1))
+        self._period = 1.0 / rate
+        self._stamp = 1_700_000_000 * SECOND
+        self._certain = False
+        self._answered_from = 0
+        self._doing = 'start'
+        self._turn = self._ordinary()
+        catalog = Catalog.load()
+        self._chains = {foot: [catalog.chain(chain, version, frame) for version in VERSIONS
+                               for frame in FOOT_FRAMES] for foot, chain in FEET.items()}
+        self.ledgers = {foot: Ledger(foot) for foot in FEET}
+        self.latencies: list[float] = []
+        self.sent = 0
+        self._coming = itertools.cycle(self._all_faults())
+        self._next_fault = 0.0
+        self.faults: dict[str, int] = {}
+        self.complaints: list[str] = []
+        for foot in FEET:
+            self._node.create_subscription(
+                PoseStamped, f'foot_pose_publisher/{foot}/pose', self._receiver(foot), self._qos,
+                raw=True)
+
+    def run(self, seconds: float, every: float) -> None:
+        """Send for some time, with another fault every few seconds [s]."""
+        due = time.monotonic()
+        end = due + seconds
+        while (now := time.monotonic()) < end:
+            if now >= self._next_fault:
+                self._next_fault = now + every
+                name, fault = next(self._coming)
+                self.faults[name] = self.faults.get(name, 0) + 1
+                self._doing, self._turn = name, fault()
+            if now >= due:
+                due = max(due + self._period, now - _CATCH_UP)
+                self._send(*next(self._turn))
+            self._executor.spin_once(timeout_sec=max(0.0, due - time.monotonic()))
+
+    def settle(self, seconds: float = 5.0) -> None:
+        """Wait until every promise is kept, and count those that are not."""
+        end = time.monotonic() + seconds
+        while any(ledger.open() for ledger in self.ledgers.values()) and time.monotonic() < end:
+            self._executor.spin_once(timeout_sec=0.05)
+        for ledger in self.ledgers.values():
+            ledger.close()
+
+    def connect(self, seconds: float = 30.0) -> bool:
+        """Send until both feet answer; return whether they do."""
+        end = time.monotonic() + seconds
+        while not self._certain and time.monotonic() < end:
+            self._send(*next(self._turn))
+            self._executor.spin_once(timeout_sec=0.05)
+        return self._certain
+
+    def _send(self, kind: str, promised: tuple[bool, bool], step: int = 1_000_000) -> None:
+        """Send one message; `promised` says which feet must answer."""
+        self._stamp += step
+        sample = self.sent % SAMPLES
+        data = self._messages[kind][sample]
+        _STAMP.pack_into(data, _STAMP_AT, *divmod(self._stamp, SECOND))
+        sent = time.monotonic_ns()
+        for ledger, is_promised in zip(self.ledgers.values(), promised, strict=True):
+            if is_promised:
+                ledger.promise(Promise(self._stamp, self._certain, sent, sample, self._doing))
+        self._publisher.publish(bytes(data[:16] if kind == 'malformed' else data))
+        self.sent += 1
+
+    def _receiver(self, foot: str) -> Callable[[bytes], None]:
+        ledger = self.ledgers[foot]
+
+        def receive(data: bytes) -> None:
+            now = time.monotonic_ns()
+            sec, nanosec = _STAMP.unpack_from(data, _STAMP_AT)
+            promise = ledger.arrived(sec * SECOND + nanosec)
+            if promise is None:
+                return
+            if ledger.kept % 10 == 0:
+                self.latencies.append((now - promise.sent) / 1000)
+            if ledger.kept % CHECKED == 0:
+                self._check(foot, promise, data)
+            if not self._certain and all(ledger.kept > self._answered_from
+                                         for ledger in self.ledgers.values()):
+                self._certain = True
+        return receive
+
+    def _check(self, foot: str, promise: Promise, data: bytes) -> None:
+        """Check that a pose is that of some configuration that has been set."""
+        q = joint_positions(12, 2 * math.pi * promise.sample / SAMPLES)[:6]
+        pose = _POSE.unpack(data[-_POSE.size:])
+        if not any(pose == chain.pose(q) for chain in self._chains[foot]):
+            self.complaints.append(f'{foot}: pose of no configuration during {promise.doing}')
+
+    # What follows are endless sequences of (kind of message, feet promised[, step of time]).
+
+    def _ordinary(self) -> Iterator[tuple[Any, ...]]:
+        while True:
+            yield 'plain', _BOTH
+
+    def _burst(self, *turns: tuple[Any, ...]) -> Callable[[], Iterator[tuple[Any, ...]]]:
+        def burst() -> Iterator[tuple[Any, ...]]:
+            for _ in range(100):
+                yield from turns
+            yield from self._ordinary()
+        return burst
+
+    def _all_faults(self) -> list[tuple[str, Callable[[], Iterator[tuple[Any, ...]]]]]:
+        ordinary = ('plain', _BOTH)
+        return [
+            ('NaN burst', self._burst(('nan', _RIGHT))),
+            ('reordered names', self._burst(('reordered', _BOTH), ordinary)),
+            ('loop', self._loop),
+            ('publisher restart', self._restart),
+            ('version change', self._change('version', itertools.cycle(VERSIONS))),
+            ('short, doubled, empty', self._burst(('short', _NONE), ('doubled', _NONE),
+                                                  ('empty', _NONE), ordinary)),
+            ('leg by leg', self._burst(('left', _LEFT), ('right', _RIGHT, -300_000))),
+            ('foot frame change', self._change('foot_frame', itertools.cycle(FOOT_FRAMES))),
+            ('malformed bytes', self._burst(('malformed', _NONE), ordinary)),
+            ('subscriber comes or goes', self._subscriber),
+            ('frame prefix change', self._change('frame_prefix', itertools.cycle(('a/', '')))),
+            ('other joints', self._burst(('others', _NONE), ordinary)),
+            ('chains change', self._change('chains', itertools.cycle(
+                (['right_leg', 'left_leg'], ['left_leg', 'right_leg'])))),
+            ('skeletons on or off', self._change('publish_markers',
+                                                 itertools.cycle((True, False)))),
+            ('kinematics file change', self._change(
+                'kinematics_file', itertools.cycle((Catalog.load().file, '')))),
+        ]
+
+    def _loop(self) -> Iterator[tuple[Any, ...]]:
+        yield 'plain', _BOTH, -10 * SECOND
+        yield from self._ordinary()
+
+    def _restart(self) -> Iterator[tuple[Any, ...]]:
+        """Leave, and come back as another publisher; nothing is certain until it is answered."""
+        self._publisher.wait_for_all_acked(Duration(seconds=5))
+        self._node.destroy_publisher(self._publisher)
+        self.settle()
+        self._certain = False
+        self._answered_from = max(ledger.kept for ledger in self.ledgers.values())
+        self._publisher = self._node.create_publisher(JointState, 'joint_states', self._qos)
+        return self._ordinary()
+
+    def _subscriber(self) -> Iterator[tuple[Any, ...]]:
+        if self._bystander is None:
+            self._bystander = self._node.create_subscription(
+                PoseStamped, 'foot_pose_publisher/left_foot/pose', lambda data: None, 10, raw=True)
+        else:
+            self._node.destroy_subscription(self._bystander)
+            self._bystander = None
+        return self._ordinary()
+
+    def _change(self, name: str, values: Iterator[Any]) -> Callable[
+            [], Iterator[tuple[Any, ...]]]:
+        def note(future: Any) -> None:
+            if not future.result().result.successful:
+                self.complaints.append(f'{name} refused: {future.result().result.reason}')
+
+        def change() -> Iterator[tuple[Any, ...]]:
+            self._client.set_parameters_atomically(
+                [Parameter(name, value=next(values))]).add_done_callback(note)
+            return self._ordinary()
+        return change
+
+
+def _messages(order: random.Random) -> dict[str, list[bytearray]]:
+    """Return the serialized gait in every kind of message."""
+    kinds: dict[str, list[bytearray]] = {}
+
+    def add(kind: str, names: list[str], positions: list[float]) -> None:
+        kinds.setdefault(kind, []).append(bytearray(serialize_message(
+            JointState(name=names, position=positions))))
+    names = list(ROBOT_JOINTS)
+    reordered = order.sample(range(32), 32)
+    knee = names.index('l_knee')
+    for sample in range(SAMPLES):
+        q = joint_positions(32, 2 * math.pi * sample / SAMPLES)
+        add('plain', names, q)
+        add('malformed', names, q)
+        add('nan', names, [*q[:knee], math.nan, *q[knee + 1:]])
+        add('reordered', [names[i] for i in reordered], [q[i] for i in reordered])
+        add('short', names, q[:-1])
+        add('doubled', [*names, 'l_knee'], [*q, 0.0])
+        add('empty', names, [])
+        add('left', names[20:26], q[20:26])
+        add('right', names[26:], q[26:])
+        add('others', names[:20], q[:20])
+    return kinds
