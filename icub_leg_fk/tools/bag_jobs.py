@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+import gc
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
 from pathlib import Path
 import time
 from typing import NamedTuple
@@ -36,18 +36,20 @@ def convert_one(task: Task, conversion: Conversion, on_progress: OnProgress) -> 
         conversion: what to do with it.
         on_progress: called now and then.
     """
+    gc.disable()  # it would look through every block in vain: there are no cycles
     try:
         with stop_on_signals():
             return convert(task.source, task.target, conversion, on_progress)
-    except BrokenPipeError:
+    except (BrokenPipeError, ConnectionResetError):  # not of the bags, but of who waits for them
         raise
     except (LegFKError, OSError) as error:
         return str(error)
+    finally:
+        gc.enable()
 
 
 def convert_all(tasks: Sequence[Task], conversion: Conversion, jobs: int,
-                on_progress: OnProgress,
-                on_outcome: Callable[[Task, Outcome], None]) -> None:
+                on_progress: OnProgress, on_outcome: Callable[[Task, Outcome], None]) -> None:
     """Convert bags, some at a time.
 
     Args:
@@ -58,53 +60,63 @@ def convert_all(tasks: Sequence[Task], conversion: Conversion, jobs: int,
         on_outcome: called with each task that is over: what has been done, or why not.
     """
     waiting = list(enumerate(tasks))
-    running: dict[Connection, tuple[int, Task, BaseProcess]] = {}
     shares = [0.0] * len(tasks)
+    working: dict[Connection, tuple[_Worker, int]] = {}
+    idle: list[_Worker] = []
     try:
-        while waiting or running:
-            while waiting and len(running) < jobs:
+        while waiting or working:
+            while waiting and len(working) < jobs:
+                worker = idle.pop() if idle else _Worker(conversion)
                 index, task = waiting.pop(0)
-                receiver, process = _start(task, conversion)
-                running[receiver] = (index, task, process)
-            ready = wait(list(running))
-            for receiver in [receiver for receiver in running if receiver in ready]:
-                index, task, process = running[receiver]
-                report = _receive(receiver)
-                if isinstance(report, float):
-                    shares[index] = report
-                else:
-                    shares[index] = 1.0
-                    del running[receiver]
-                    process.join()
-                    on_outcome(task, report)
+                worker.pipe.send(task)
+                working[worker.pipe] = worker, index
+            ready = wait(list(working))
+            for pipe in [pipe for pipe in working if pipe in ready]:
+                worker, index = working[pipe]
+                report = worker.report()
+                shares[index] = report if isinstance(report, float) else 1.0
+                if not isinstance(report, float):
+                    del working[pipe]
+                    if worker.process.is_alive():
+                        idle.append(worker)
+                    on_outcome(tasks[index], report)
             on_progress(sum(shares) / len(shares))
     finally:
-        for _, _, process in running.values():
-            process.terminate()
-        for _, _, process in running.values():
-            process.join()
+        everyone = [*idle, *(worker for worker, _ in working.values())]
+        for worker in everyone:
+            worker.process.terminate()
+        for worker in everyone:
+            worker.process.join()
 
 
-def _start(task: Task, conversion: Conversion) -> tuple[Connection, BaseProcess]:
-    # Not forked: a fork copies the threads of numpy's libraries in whatever state they are.
-    context = get_context('spawn')
-    receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_work, args=(sender, task, conversion))
-    process.start()
-    sender.close()
-    return receiver, process
+class _Worker:
+    """A process that converts one bag after another.
+
+    Attributes:
+        pipe: takes tasks.
+        process: the process.
+    """
+
+    def __init__(self, conversion: Conversion) -> None:
+        # Not forked: a fork copies the threads of numpy's libraries in whatever state they are.
+        context = get_context('spawn')
+        self.pipe, theirs = context.Pipe()
+        self.process = context.Process(target=_work, args=(theirs, conversion), daemon=True)
+        self.process.start()
+        theirs.close()
+
+    def report(self) -> float | Outcome:
+        """Return what the process reports next: the share that is done, or how a task went."""
+        try:
+            report: float | Outcome = self.pipe.recv()
+            return report
+        except (EOFError, ConnectionResetError):
+            self.process.join()
+            return 'the process that worked on it was killed'
 
 
-def _receive(receiver: Connection) -> float | Outcome:
-    try:
-        report: float | Outcome = receiver.recv()
-        return report
-    except EOFError:
-        return 'the process that worked on it was killed'
-
-
-def _work(sender: Connection, task: Task, conversion: Conversion) -> None:
-    """Convert one bag and report; ends at once if there is nobody left to report to."""
+def _work(pipe: Connection, conversion: Conversion) -> None:
+    """Convert bags and report; ends at once if there is nobody left to report to."""
     last = 0.0
 
     def report(share: float) -> None:
@@ -112,7 +124,8 @@ def _work(sender: Connection, task: Task, conversion: Conversion) -> None:
         now = time.monotonic()
         if now - last >= _REPORT_PERIOD:
             last = now
-            sender.send(share)
+            pipe.send(share)
 
-    with suppress(KeyboardInterrupt, BrokenPipeError):
-        sender.send(convert_one(task, conversion, report))
+    with suppress(KeyboardInterrupt, EOFError, BrokenPipeError, ConnectionResetError):
+        while True:
+            pipe.send(convert_one(pipe.recv(), conversion, report))

@@ -1,7 +1,8 @@
 """Writes one MCAP file as rosbag2 does: messages in chunks, with every index and a summary.
 
-Formed here rather than by a library because a message costs 0.7 us this way, which is a fifth of
-what rosbags' writer takes and a tenth of that of the `mcap` package.
+Formed here rather than by a library for the sake of speed: a message of 1.4 kB costs 2.2 us this
+way, and 5 us with the writers of rosbags and of the `mcap` package; there are three to a pose of
+two feet, for which everything else takes 9 us together.
 """
 
 from __future__ import annotations

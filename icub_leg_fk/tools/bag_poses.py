@@ -94,13 +94,14 @@ class PoseAdder:
         return self._stream.settle()
 
     def _collector(self, output: _ChainOutput) -> OnReady:
-        places = [None] * output.places
+        places = (None,) * output.places
+        ready = output.ready
 
         def collect(sec: int, nanosec: int, q: Sequence[float],
                     qdot: Sequence[float] | None) -> None:
             block = self._block
-            output.ready.append((len(block), self._time, sec, nanosec, q, qdot))
-            block += places
+            ready.append((len(block), self._time, sec, nanosec, q, qdot))
+            block.extend(places)
         return collect
 
 
@@ -133,7 +134,8 @@ class _ChainOutput:
         """Put the messages at their places and return how many twists there could not be."""
         if not self.ready:
             return 0
-        ready, self.ready = self.ready, []
+        ready = self.ready[:]
+        self.ready.clear()
         poses = self._chain.poses_as_one_by_one([item[4] for item in ready]).tolist()
         topic, encode = self._pose_topic, self._encode_pose
         added[topic] += len(ready)

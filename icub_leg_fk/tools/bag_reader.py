@@ -58,6 +58,7 @@ class BagReader:
         self.attachments = 0
         self.progress = 0.0
         self._scratch = scratch
+        self._made: list[Path] = []
         self._undecodable = 0
         self._metadata = self._read_metadata()
         self.custom_data = self._metadata.custom_data
@@ -171,19 +172,21 @@ class BagReader:
         plain = path
         if compressed:
             plain = self._scratch / path.stem
+            self._made.append(plain)
             if problem := decompress_file(path, plain):
                 damage.append(problem)
         if plain.suffix == '.db3' and (torn := torn_bytes(plain)):
             damage.append('is cut off')
             whole = self._scratch / f'whole_{plain.name}'
+            self._made.append(whole)
             shutil.copyfile(plain, whole)
             os.truncate(whole, plain.stat().st_size - torn)
             plain = whole
         return plain
 
     def _clear_scratch(self) -> None:
-        for file in self._scratch.iterdir():
-            file.unlink()
+        while self._made:
+            self._made.pop().unlink(missing_ok=True)
 
     def _uncompressed(self, block: list[Message]) -> list[Message]:
         """Return messages that may each be compressed, as only the metadata can tell, plain."""

@@ -1,0 +1,222 @@
+"""What `leg_fk bag` writes, as libraries that are not ours see it: `mcap` and sqlite."""
+
+from collections import Counter
+import sqlite3
+
+from bag_files import (
+    joint_state,
+    LEFT_POSE,
+    LEGS,
+    POSE,
+    read_bag,
+    RIGHT_POSE,
+    START,
+    TYPES,
+    typesys,
+    walk,
+    write_bag,
+)
+from leg_fk_process import leg_fk
+import pytest
+
+ADDED = {LEFT_POSE: POSE, RIGHT_POSE: POSE,
+         '/foot_pose_publisher/left_foot/twist': 'geometry_msgs/msg/TwistStamped',
+         '/foot_pose_publisher/right_foot/twist': 'geometry_msgs/msg/TwistStamped',
+         '/tf': 'tf2_msgs/msg/TFMessage'}
+
+
+@pytest.fixture(scope='module', params=[None, 'storage'])
+def bag(request, tmp_path_factory):
+    """Return an mcap bag of several chunks, plain or compressed, and what was made of it."""
+    folder = tmp_path_factory.mktemp('formats')
+    source = write_bag(folder / 'in', joints=walk(1500), compression=request.param)
+    done = leg_fk('bag', source, folder / 'out', '--twist', '--tf')
+    assert done.returncode == 0, done
+    return source, folder / 'out'
+
+
+def test_the_mcap_library_finds_every_message_with_its_index(bag):
+    reader_module = pytest.importorskip('mcap.reader')
+    _, target = bag
+    _, messages = read_bag(target)
+    with (target / 'out_0.mcap').open('rb') as file:
+        reader = reader_module.SeekingReader(file, validate_crcs=True)
+        found = [(channel.topic, message.log_time, message.data)
+                 for _, channel, message in reader.iter_messages(log_time_order=True)]
+        assert found == messages
+        summary = reader.get_summary()
+        assert reader.get_header().profile == 'ros2'
+    statistics = summary.statistics
+    assert statistics.message_count == len(messages)
+    assert statistics.chunk_count == len(summary.chunk_indexes) >= 3
+    times = [time for _, time, _ in messages]
+    assert (statistics.message_start_time, statistics.message_end_time) == (times[0], times[-1])
+    counts = Counter(topic for topic, _, _ in messages)
+    assert {summary.channels[number].topic: count
+            for number, count in statistics.channel_message_counts.items()} == {
+                **counts, '/silent': 0}
+    half = times[len(times) // 2]
+    with (target / 'out_0.mcap').open('rb') as file:
+        reader = reader_module.SeekingReader(file)
+        late = [message.log_time for _, _, message in reader.iter_messages(
+            topics=[LEFT_POSE], start_time=half)]
+    assert late == [time for topic, time, _ in messages if topic == LEFT_POSE and time >= half]
+
+
+def test_the_mcap_library_reads_the_file_as_a_stream_too(bag):
+    """From its first byte to its last, every record, without the summary's help."""
+    stream_reader = pytest.importorskip('mcap.stream_reader')
+    records = pytest.importorskip('mcap.records')
+    _, target = bag
+    with (target / 'out_0.mcap').open('rb') as file:
+        found = list(stream_reader.StreamReader(file, validate_crcs=True).records)
+    kinds = Counter(type(record).__name__ for record in found)
+    assert kinds['Footer'] == kinds['DataEnd'] == kinds['Statistics'] == 1
+    messages = [record for record in found if isinstance(record, records.Message)]
+    assert [message.data for message in messages] == [data for _, _, data in read_bag(target)[1]]
+    metadata, = (record for record in found if isinstance(record, records.Metadata))
+    assert metadata.name == 'rosbag2'
+    assert 'version: 9' in metadata.metadata['serialized_metadata']
+
+
+def test_channels_and_schemas_are_as_rosbag2_writes_them(bag):
+    reader_module = pytest.importorskip('mcap.reader')
+    source, target = bag
+    with (source / 'in.mcap').open('rb') as file:
+        old = reader_module.SeekingReader(file).get_summary()
+    with (target / 'out_0.mcap').open('rb') as file:
+        new = reader_module.SeekingReader(file).get_summary()
+    by_topic = {channel.topic: channel for channel in new.channels.values()}
+    for channel in old.channels.values():
+        copy = by_topic[channel.topic]
+        assert copy.message_encoding == channel.message_encoding == 'cdr'
+        assert copy.metadata['offered_qos_profiles'] == channel.metadata['offered_qos_profiles']
+        old_schema, schema = old.schemas[channel.schema_id], new.schemas[copy.schema_id]
+        assert (schema.name, schema.encoding, schema.data) == (
+            old_schema.name, old_schema.encoding, old_schema.data)
+        assert copy.metadata['topic_type_hash'] == TYPES.hash_rihs01(schema.name)
+    for topic, message_type in ADDED.items():
+        schema = new.schemas[by_topic[topic].schema_id]
+        assert (schema.name, schema.encoding) == (message_type, 'ros2msg')
+        assert by_topic[topic].metadata['topic_type_hash'] == TYPES.hash_rihs01(message_type)
+
+
+def test_definitions_of_what_is_added_are_those_of_ros(bag):
+    """Parsed by rosbags, they have the hash that ROS gives the type."""
+    reader_module = pytest.importorskip('mcap.reader')
+    _, target = bag
+    with (target / 'out_0.mcap').open('rb') as file:
+        schemas = reader_module.SeekingReader(file).get_summary().schemas.values()
+    for schema in schemas:
+        if schema.name in ADDED.values():
+            types = typesys.get_typestore(typesys.Stores.EMPTY)
+            types.register(typesys.get_types_from_msg(schema.data.decode(), schema.name))
+            assert types.hash_rihs01(schema.name) == TYPES.hash_rihs01(schema.name)
+
+
+@pytest.mark.parametrize('compression', ['zstd', 'lz4'])
+def test_bags_of_the_mcap_library_are_read(tmp_path, compression):
+    """Chunked or not, with publish times, sequence numbers, attachments and disorder."""
+    writer_module = pytest.importorskip('mcap.writer')
+    codec = writer_module.CompressionType[compression.upper()]
+    for chunked in (True, False):
+        file = tmp_path / f'{compression}_{chunked}.mcap'
+        writer = writer_module.Writer(str(file), chunk_size=20_000, compression=codec,
+                                      use_chunking=chunked)
+        writer.start('ros2', 'a robot')
+        definition, _ = TYPES.generate_msgdef('sensor_msgs/msg/JointState', ros_version=2)
+        schema = writer.register_schema('sensor_msgs/msg/JointState', 'ros2msg',
+                                        definition.encode())
+        channels = [writer.register_channel('/joint_states', 'cdr', schema),
+                    writer.register_channel('/others', 'cdr', schema)]
+        expected = []
+        for i in range(400):
+            time = START + 1_000_000 * (i + (7 if i % 10 == 0 else 0))  # out of order by up to 7
+            data = joint_state(time, LEGS)
+            writer.add_message(channels[i % 2], time, data, time - 500, i)
+            expected.append((time, time - 500, i, ('/joint_states', '/others')[i % 2], data))
+        writer.add_attachment(START, START, 'calibration.txt', 'text/plain', b'1 2 3')
+        writer.finish()
+        done = leg_fk('bag', file, tmp_path / f'out_{chunked}.mcap')
+        assert (done.returncode, done.stderr) == (0, ''), done
+        assert 'note: 1 MCAP attachments are not copied' in done.stdout
+        reader_module = pytest.importorskip('mcap.reader')
+        with (tmp_path / f'out_{chunked}.mcap').open('rb') as stream:
+            reader = reader_module.SeekingReader(stream, validate_crcs=True)
+            found = [(message.log_time, message.publish_time, message.sequence, channel.topic,
+                      message.data) for _, channel, message in reader.iter_messages()]
+            used = {index.compression for index in reader.get_summary().chunk_indexes}
+        assert [row for row in found if 'foot_pose' not in row[3]] == sorted(
+            expected, key=lambda row: row[0])
+        assert sum(row[3] == LEFT_POSE for row in found) == 200
+        assert used == {compression if chunked else ''}
+
+
+def test_the_sqlite_file_has_rosbag2s_tables(tmp_path):
+    """Statements as in rosbag2_storage_sqlite3 (sqlite_storage.cpp, schema version 4)."""
+    write_bag(tmp_path / 'in', 'sqlite3', joints=walk(100))
+    done = leg_fk('bag', tmp_path / 'in', tmp_path / 'out', '--twist', '--tf')
+    assert done.returncode == 0, done
+    old = sqlite3.connect(tmp_path / 'in' / 'in.db3')
+    new = sqlite3.connect(tmp_path / 'out' / 'out_0.db3')
+
+    def columns(database):
+        return {table: database.execute(f'PRAGMA table_info({table})').fetchall() for table in (
+            'schema', 'metadata', 'topics', 'message_definitions', 'messages')}
+    assert columns(new) == columns(old)
+    assert new.execute("SELECT sql FROM sqlite_master WHERE type = 'index'").fetchall() == [
+        ('CREATE INDEX timestamp_idx ON messages (timestamp ASC)',)]
+    assert new.execute('PRAGMA integrity_check').fetchone() == ('ok',)
+    assert new.execute('SELECT * FROM schema').fetchall() == [(4, 'jazzy')]
+    (version, text), = new.execute('SELECT metadata_version, metadata FROM metadata').fetchall()
+    assert version == 9 and text.startswith('version: 9\n')
+    topics = {row[1]: row[2:] for row in new.execute('SELECT * FROM topics')}
+    for row in old.execute('SELECT * FROM topics'):
+        assert topics[row[1]] == row[2:]
+    definitions = {row[0]: row[1:] for row in new.execute(
+        'SELECT topic_type, encoding, encoded_message_definition, type_description_hash '
+        'FROM message_definitions')}
+    for row in old.execute('SELECT topic_type, encoding, encoded_message_definition, '
+                           'type_description_hash FROM message_definitions'):
+        assert definitions[row[0]] == row[1:]
+    for topic, message_type in ADDED.items():
+        assert topics[topic][0] == message_type
+        assert definitions[message_type][2] == TYPES.hash_rihs01(message_type)
+    replayed = new.execute(  # the query of rosbag2's player
+        'SELECT topics.name, timestamp, data FROM messages JOIN topics '
+        'ON messages.topic_id = topics.id ORDER BY messages.timestamp, messages.id').fetchall()
+    assert replayed == read_bag(tmp_path / 'out')[1]
+
+
+def test_qos_in_the_numbers_of_older_recorders_becomes_names(tmp_path):
+    """Up to Iron, metadata.yaml and the files held policies as numbers, in one text."""
+    import yaml
+    write_bag(tmp_path / 'in', 'sqlite3', joints=walk(3))
+    file = tmp_path / 'in' / 'metadata.yaml'
+    metadata = yaml.safe_load(file.read_text())
+    information = metadata['rosbag2_bagfile_information']
+    information['version'] = 5
+    infinite = {'sec': 9223372036, 'nsec': 854775807}
+    profile = {'history': 1, 'depth': 7, 'reliability': 2, 'durability': 1, 'deadline': infinite,
+               'lifespan': infinite, 'liveliness': 1, 'liveliness_lease_duration': infinite,
+               'avoid_ros_namespace_conventions': False}
+    text = yaml.safe_dump([profile])
+    for entry in information['topics_with_message_count']:
+        entry['topic_metadata']['offered_qos_profiles'] = text
+        del entry['topic_metadata']['type_description_hash']
+    file.write_text(yaml.safe_dump(metadata))
+    database = sqlite3.connect(tmp_path / 'in' / 'in.db3')
+    database.execute('UPDATE topics SET offered_qos_profiles = ?', (text,))
+    database.commit()
+    database.close()
+    before = read_bag(tmp_path / 'in')
+    for storage in ('sqlite3', 'mcap'):
+        done = leg_fk('bag', tmp_path / 'in', tmp_path / storage, '--storage', storage)
+        assert done.returncode == 0, done
+        topics, _ = read_bag(tmp_path / storage)
+        assert {name: topics[name] for name in before[0]} == before[0]
+        new = yaml.safe_load((tmp_path / storage / 'metadata.yaml').read_text())
+        for entry in new['rosbag2_bagfile_information']['topics_with_message_count'][:2]:
+            assert entry['topic_metadata']['offered_qos_profiles'] == [{
+                **profile, 'history': 'keep_last', 'reliability': 'best_effort',
+                'durability': 'transient_local', 'liveliness': 'automatic'}]
