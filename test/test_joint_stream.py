@@ -71,6 +71,26 @@ def test_only_the_first_message_of_a_kind_is_decoded_in_full(chains, decoded):
     assert len(decoded) == 2
 
 
+def test_velocities_may_be_wanted_later_and_no_longer(chains, decoded):
+    stream = JointStream(JointInput(chains, 0.5), lambda: 0)
+    velocities = []
+    stream.on_ready = [None, None, lambda sec, nanosec, q, qdot: velocities.append(qdot)]
+    expected = []
+    for ms in range(1000, 1030):
+        wanted = 1010 <= ms < 1020
+        if ms in (1010, 1020):
+            stream.want_velocities(wanted)
+        message = at(ms, velocities=(1.0, 2.0, 3.0, float(ms)))
+        stream.feed(message.cdr())
+        held = dict(zip(message.names, message.velocities, strict=True))
+        expected.append(tuple(held[name] for name in chains[POINTER].joint_names)
+                        if wanted else None)
+    assert velocities == expected
+    assert len(decoded) == 1 + 10 + 1
+    assert stream.settle().messages == 30
+    assert stream.settle().take_counts(POINTER).ready == 30
+
+
 def test_padding_that_changes_every_time_does_not_slow_the_stream_down(chains, decoded):
     stream = JointStream(JointInput(chains, 0.5), lambda: 0)
     for i in range(100):

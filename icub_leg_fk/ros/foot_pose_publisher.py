@@ -46,8 +46,7 @@ class FootPosePublisher(Node):
         if self._stream is not None:
             joint_input.take_over(self._stream.settle())
         self._outputs.configure(configuration)
-        self._stream = JointStream(joint_input, lambda: self.get_clock().now().nanoseconds,
-                                   velocities=configuration.publish_twist)
+        self._stream = JointStream(joint_input, lambda: self.get_clock().now().nanoseconds)
         self._diagnostics.watch(self._stream)
         self._connect()
         for note in configuration.notes:
@@ -61,6 +60,7 @@ class FootPosePublisher(Node):
         """Give each chain's joint vectors to the topics that somebody subscribes to."""
         if self._stream is not None:
             self._stream.on_ready = self._outputs.handlers()
+            self._stream.want_velocities(self._outputs.want_velocities())
 
     def _settled(self) -> JointInput:
         assert self._stream is not None

@@ -121,6 +121,14 @@ class JointStream:
         self._newest: int | None = None
         self._fed = 0
 
+    def want_velocities(self, wanted: bool) -> None:
+        """Change whether velocities are wanted, from the next message on."""
+        if wanted:
+            self.settle()
+            self._layouts.clear()
+            self._layout = None
+        self._plain_only = wanted
+
     def feed(self, data: bytes) -> None:
         """Take one serialized JointState in."""
         layout = self._layout

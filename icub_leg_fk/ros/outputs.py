@@ -74,6 +74,10 @@ class Outputs:
         return [self._handler(index, chain, self._configuration)
                 for index, chain in enumerate(self._configuration.chains)]
 
+    def want_velocities(self) -> bool:
+        """Return whether somebody subscribes to a twist."""
+        return any(self._wanted(topic) for topic in self._publishers if topic.endswith('/twist'))
+
     def _create(self, topic: str, message_type: Any) -> Publisher:
         qos = QoSProfile(depth=_DEPTH)
         if self._events_supported:
