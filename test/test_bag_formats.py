@@ -55,12 +55,10 @@ def test_the_mcap_library_finds_every_message_with_its_index(bag):
     assert {summary.channels[number].topic: count
             for number, count in statistics.channel_message_counts.items()} == {
                 **counts, '/silent': 0}
-    half = times[len(times) // 2]
     with (target / 'out_0.mcap').open('rb') as file:
-        reader = reader_module.SeekingReader(file)
-        late = [message.log_time for _, _, message in reader.iter_messages(
-            topics=[LEFT_POSE], start_time=half)]
-    assert late == [time for topic, time, _ in messages if topic == LEFT_POSE and time >= half]
+        poses = [message.data for _, _, message in
+                 reader_module.SeekingReader(file).iter_messages(topics=[LEFT_POSE])]
+    assert poses == [data for topic, _, data in messages if topic == LEFT_POSE]
 
 
 def test_the_mcap_library_reads_the_file_as_a_stream_too(bag):

@@ -7,9 +7,6 @@ the tool adds to the bag as bytes.
 import math
 import random
 
-import pytest
-
-pytest.importorskip('rclpy', reason='the node needs ROS 2')
 from bag_files import (
     joint_state,
     LEGS,
@@ -25,6 +22,7 @@ from geometry_msgs.msg import PoseStamped
 from leg_fk_process import leg_fk
 from node_harness import FEET, LOSSLESS, NodeProcess, Robot
 import numpy as np
+import pytest
 
 BURST = 50
 

@@ -181,10 +181,10 @@ def _check_apart(source: Path, target: Path) -> None:
 def _joint_topics(bag: BagReader, name: str) -> list[int]:
     """Return the indices of the topic of joint states: files of a bag may describe it apart."""
     found = [index for index, topic in enumerate(bag.topics)
-             if (topic.name, topic.type, topic.serialization_format)
+             if (topic.name, topic.type_name, topic.serialization_format)
              == (name, JOINT_STATE, 'cdr')]
     if not found:
-        present = sorted({topic.name for topic in bag.topics if topic.type == JOINT_STATE})
+        present = sorted({topic.name for topic in bag.topics if topic.type_name == JOINT_STATE})
         listed = ', '.join(present) or 'none; it has no sensor_msgs/msg/JointState'
         raise InputFileError(f'{bag.path}: found no joint states on {name}; --joint-topic may '
                              f'be: {listed}')
@@ -197,7 +197,7 @@ def _not_yet_there(bag: BagReader, old: Sequence[Topic], added: Sequence[Topic])
     Raises:
         InputFileError: another one is there already.
     """
-    types = {topic.name: topic.type for topic in old}
+    types = {topic.name: topic.type_name for topic in old}
     for topic in added:
         if topic.name in types and types[topic.name] != TF:
             raise InputFileError(f'{bag.path}: has {topic.name} already; --only-poses writes the '

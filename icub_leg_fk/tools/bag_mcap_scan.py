@@ -135,7 +135,7 @@ class McapScan:
             self.damage.append(f'chunk at byte {at}: larger than {_LARGEST_CHUNK} bytes')
         elif present > 0:
             self.spans.append(mcap.Span(start, at, end, present, present == data_size,
-                                         compression, plain_size, crc))
+                                        compression, plain_size, crc))
 
     def _note_message(self, head: bytes, at: int, end: int) -> None:
         if len(head) < mcap.MESSAGE_HEAD.size:
@@ -144,7 +144,7 @@ class McapScan:
         last = self.spans[-1] if self.spans else None
         if last and not last.plain_size and last.offset + last.size == at and last.size < _BLOCK:
             self.spans[-1] = last._replace(start=min(last.start, time), end=max(last.end, time),
-                                            size=end - last.offset)
+                                           size=end - last.offset)
         else:
             self.spans.append(mcap.Span(time, at, time, end - at))
 

@@ -153,7 +153,7 @@ def _descriptions(topics: Sequence[Topic]) -> tuple[list[bytes], list[bytes]]:
     schemas: dict[tuple[str, str, str], bytes] = {}
     channels = []
     for channel, topic in enumerate(topics, 1):
-        key = (topic.type, topic.encoding, topic.definition)
+        key = (topic.type_name, topic.encoding, topic.definition)
         if key not in schemas:
             schemas[key] = mcap.record(mcap.SCHEMA, struct.pack('<H', len(schemas) + 1),
                                        *map(mcap.text, key))

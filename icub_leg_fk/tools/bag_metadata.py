@@ -92,7 +92,7 @@ def describe(storage: str, file: str, topics: Sequence[Topic], counts: Sequence[
         'topics_with_message_count': [
             {'topic_metadata': {
                 'name': topic.name,
-                'type': topic.type,
+                'type': topic.type_name,
                 'serialization_format': topic.serialization_format,
                 'offered_qos_profiles': _profiles(topic.qos),
                 'type_description_hash': topic.type_hash},
@@ -118,6 +118,7 @@ def as_yaml(value: Any) -> str:
 
 
 class _PlainDumper(yaml.SafeDumper):
+
     def ignore_aliases(self, data: Any) -> bool:
         return True
 

@@ -162,8 +162,8 @@ class BagReader:
         """Add the topics without any message, of which only the metadata may tell."""
         for topic in self._metadata.topics:
             if all(topic[:3] != present[:3] for present in self.topics):
-                like = next((present for present in self.topics if present.type == topic.type),
-                            topic)
+                like = next((present for present in self.topics
+                             if present.type_name == topic.type_name), topic)
                 self.topics.append(topic._replace(encoding=like.encoding,
                                                   definition=like.definition))
 

@@ -46,8 +46,9 @@ class SqliteWriter:
         self._database.executemany(
             'INSERT INTO topics VALUES (?, ?, ?, ?, ?, ?)',
             [(number, *topic[:5]) for number, topic in enumerate(topics, 1)])
-        definitions = {topic.type: (topic.type, topic.encoding, topic.definition, topic.type_hash)
-                       for topic in topics if topic.definition}
+        definitions = {
+            topic.type_name: (topic.type_name, topic.encoding, topic.definition, topic.type_hash)
+            for topic in topics if topic.definition}
         self._database.executemany(
             'INSERT INTO message_definitions (topic_type, encoding, encoded_message_definition, '
             'type_description_hash) VALUES (?, ?, ?, ?)', definitions.values())

@@ -18,7 +18,7 @@ class Topic(NamedTuple):
 
     Attributes:
         name: full name.
-        type: message type, such as `sensor_msgs/msg/JointState`.
+        type_name: message type, such as `sensor_msgs/msg/JointState`.
         serialization_format: `cdr`.
         qos: offered QoS profiles, YAML; empty if unknown.
         type_hash: REP-2011 hash of the type; empty if unknown.
@@ -27,7 +27,7 @@ class Topic(NamedTuple):
     """
 
     name: str
-    type: str
+    type_name: str
     serialization_format: str = 'cdr'
     qos: str = ''
     type_hash: str = ''

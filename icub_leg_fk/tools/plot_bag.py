@@ -96,13 +96,13 @@ def read_bag(path: Path, chains: Sequence[Chain], topic: str | None) -> BagTrack
 
 def _joint_topics(bag: BagReader, wanted: str | None) -> list[int]:
     """Return the indices of the topic to read the joint states from."""
-    known = sorted({topic.name for topic in bag.topics if topic.type == JOINT_STATE})
+    known = sorted({topic.name for topic in bag.topics if topic.type_name == JOINT_STATE})
     name = wanted or (DEFAULT_TOPIC if DEFAULT_TOPIC in known or len(known) != 1 else known[0])
     if name not in known:
         raise InputFileError(f'{bag.path}: found no joint states on {name}, allowed: '
                              f'--joint-topic with one of {", ".join(known) or "(none there)"}')
     return [index for index, topic in enumerate(bag.topics)
-            if (topic.name, topic.type) == (name, JOINT_STATE)]
+            if (topic.name, topic.type_name) == (name, JOINT_STATE)]
 
 
 def _unknown(joint_input: JointInput, chain: int) -> str:
