@@ -93,8 +93,8 @@ class NodeProcess:
 
     def log(self):
         """Return what the node has written so far."""
-        self._log.seek(0)
-        return self._log.read().decode()
+        size = os.fstat(self._log.fileno()).st_size
+        return os.pread(self._log.fileno(), size, 0).decode()  # the node writes at its own place
 
     def stop(self, *signals):
         """Stop it (SIGINT, unless told otherwise) and check that it ends well."""

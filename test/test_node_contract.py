@@ -129,7 +129,11 @@ def test_qos_can_be_overridden_by_parameters_and_a_mismatch_is_said():
         inbox = robot.listen(PoseStamped, left, LATE)
         robot.wait_for(inbox, SECOND)
         robot.node.create_publisher(JointState, 'joint_states', BEST_EFFORT)
-        node.wait_for_log('incompatible QoS')
+        node.wait_for_log("publisher discovered on topic 'joint_states', "
+                          'offering incompatible QoS')
+        robot.listen(PoseStamped, node.topic('right_foot/pose'), DEEP)
+        node.wait_for_log("subscription discovered on topic '~/right_foot/pose', requesting "
+                          'incompatible QoS')
 
 
 def test_nodes_in_namespaces_work_side_by_side():

@@ -170,6 +170,20 @@ def test_malformed_bytes_are_refused_and_change_nothing(robot):
     only_sentinel(robot, t)
 
 
+def test_huge_messages_do_no_harm(robot):
+    t = robot.start + MS
+    robot.send(t, [f'joint_{i}' for i in range(100_000)])
+    robot.send(t, ['x' * 3_000_000], [0.0])
+    only_sentinel(robot, t)
+
+
+def test_empty_bytes_over_the_default_qos_are_dropped():
+    with NodeProcess() as node, Robot(node) as robot:
+        t = robot.connect()
+        robot.joints.publish(b'')
+        robot.connect(t + SECOND)
+
+
 def test_names_that_are_no_text_are_nobodys_joints(robot):
     t = robot.start + MS
     message = JointState(name=['l_kneeX', *BOTH], position=[9.0, *Q])

@@ -112,7 +112,7 @@ def _executor() -> Any:
     try:
         from rclpy.experimental.events_executor import EventsExecutor
         return EventsExecutor()
-    except (ImportError, AttributeError) as error:
+    except (ImportError, AttributeError, RuntimeError) as error:
         from rclpy.executors import SingleThreadedExecutor
         from rclpy.logging import get_logger
         get_logger('foot_pose_publisher').info(
