@@ -48,6 +48,15 @@ def cpu_ns(pid: int) -> int:
 
 
 def resident_bytes(pid: int) -> int:
-    """Return the resident size of a process [bytes]."""
-    status = Path(f'/proc/{pid}/status').read_text(encoding='ascii')
-    return int(status.split('VmRSS:')[1].split()[0]) * 1024
+    """Return the resident size of a process [bytes]; 0 if it has ended."""
+    return _status_bytes(pid, 'VmRSS:')
+
+
+def peak_resident_bytes(pid: int) -> int:
+    """Return the largest resident size that a process has had [bytes]; 0 if it has ended."""
+    return _status_bytes(pid, 'VmHWM:')
+
+
+def _status_bytes(pid: int, key: str) -> int:
+    _, found, value = Path(f'/proc/{pid}/status').read_text(encoding='ascii').partition(key)
+    return int(value.split()[0]) * 1024 if found else 0

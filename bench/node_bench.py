@@ -6,7 +6,7 @@ meets all of them; every ratio is of two stretches that followed one another.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import closing, ExitStack
 from typing import NamedTuple
 
@@ -45,8 +45,8 @@ def measure_node(report: Report, effort: Effort) -> None:
     """Add the rows of points 1 to 4 and 7, the bill and the growth with the load."""
     with closing(Bench()) as bench:
         _measure_side_by_side(report, bench, effort)
-        _measure_starts(report, bench, effort)
         _measure_saturation(report, bench, effort)
+        _measure_starts(report, bench, effort)
         _measure_growth(report, bench, effort)
 
 
@@ -100,10 +100,7 @@ def _measure_side_by_side(report: Report, bench: Bench, effort: Effort) -> None:
 
 
 def _take_turns(bench: Bench, nodes: dict[str, NodeProcess], effort: Effort) -> Turns:
-    for node in nodes.values():
-        bench.watch(node)
-    for node in nodes.values():
-        bench.match(node)
+    _match(bench, nodes.values())
     turns: Turns = {name: [] for name in nodes}
     for _ in range(effort.rounds):
         for name, node in nodes.items():
@@ -136,7 +133,8 @@ def _measure_starts(report: Report, bench: Bench, effort: Effort) -> None:
 
 def _measure_saturation(report: Report, bench: Bench, effort: Effort) -> None:
     report.section('3. reliable QoS, every pose in order')
-    with closing(_matched(bench, NodeProcess('fast', 'ours'))) as node:
+    with closing(NodeProcess('fast', 'ours')) as node:
+        _match(bench, [node])
         count = 2 * effort.messages
         stretches = [bench.stretch(node, _JOINTS, 2000.0, count) for _ in range(effort.rounds)]
         poses = 2 * count * effort.rounds
@@ -154,18 +152,20 @@ def _measure_saturation(report: Report, bench: Bench, effort: Effort) -> None:
         bench.forget(node)
 
 
-def _matched(bench: Bench, node: NodeProcess) -> NodeProcess:
-    bench.watch(node)
-    bench.match(node)
-    return node
+def _match(bench: Bench, nodes: Iterable[NodeProcess]) -> None:
+    for node in nodes:
+        bench.watch(node)
+    for node in nodes:
+        bench.match(node)
 
 
 def _measure_growth(report: Report, bench: Bench, effort: Effort) -> None:
     """Add the curves of joints, chains and rate to the picture."""
     with ExitStack() as stack:
         names = ('plain', 'ours', 'floor')
-        nodes = {name: stack.enter_context(closing(_matched(
-            bench, NodeProcess(f'grow_{name}', name)))) for name in names}
+        nodes = {name: stack.enter_context(closing(NodeProcess(f'grow_{name}', name)))
+                 for name in names}
+        _match(bench, nodes.values())
         for joints in (12, 32, 64, 96, 128) if effort.points else (12, 128):
             _grow(report, bench, nodes, 'joints', joints, joints, _RATE, effort)
         for rate in (100.0, 300.0, 1000.0, 2000.0, 3000.0, 4500.0) if effort.points else (100.0,):
@@ -175,8 +175,8 @@ def _measure_growth(report: Report, bench: Bench, effort: Effort) -> None:
     chains, tips = ['left_leg', 'right_leg', 'head_imu'], [*TIPS, 'head_imu']
     for count in range(1, 1 + len(chains)):
         parameters = (f'chains:=[{",".join(chains[:count])}]', 'head_imu.version:=v2')
-        with closing(_matched(bench, NodeProcess(
-                f'chains_{count}', 'ours', tips[:count], parameters))) as node:
+        with closing(NodeProcess(f'chains_{count}', 'ours', tips[:count], parameters)) as node:
+            _match(bench, [node])
             _grow(report, bench, {'ours': node}, 'chains', count, _JOINTS, _RATE, effort)
             bench.forget(node)
 

@@ -1,0 +1,29 @@
+"""The joint states that every measurement uses."""
+
+from __future__ import annotations
+
+import math
+
+ROBOT_JOINTS = (
+    *(f'torso_{axis}' for axis in ('pitch', 'roll', 'yaw')),
+    *(f'neck_{axis}' for axis in ('pitch', 'roll', 'yaw')),
+    *(f'{side}_{joint}' for side in 'lr' for joint in (
+        'shoulder_pitch', 'shoulder_roll', 'shoulder_yaw', 'elbow', 'wrist_prosup', 'wrist_pitch',
+        'wrist_yaw')),
+    *(f'{side}_{joint}' for side in 'lr' for joint in (
+        'hip_pitch', 'hip_roll', 'hip_yaw', 'knee', 'ankle_pitch', 'ankle_roll')),
+)
+"""The 32 joints of the simulated iCub; the last twelve are the legs'."""
+
+
+def joint_names(count: int) -> list[str]:
+    """Return `count` joint names, at least the legs' twelve, the legs last."""
+    more = [f'l_hand_finger_{i}' for i in range(count - len(ROBOT_JOINTS))]
+    return [*more, *ROBOT_JOINTS][-count:]
+
+
+def joint_positions(count: int, phase: float) -> list[float]:
+    """Return `count` joint positions inside every documented range [rad]."""
+    swing = 0.1 * math.sin(phase)
+    legs = [0.2 + swing, 0.05, 0.02 * swing, -0.5 - swing, -0.2 + swing, 0.03]
+    return [*(swing for _ in range(count - 12)), *legs, *legs]
