@@ -10,7 +10,7 @@ import struct
 import time
 from typing import Any
 
-from bench.load import joint_positions, ROBOT_JOINTS
+from bench.joint_messages import joint_positions, ROBOT_JOINTS
 from bench.soak_ledger import Ledger, Promise
 from geometry_msgs.msg import PoseStamped
 from icub_leg_fk.kinematics import Catalog

@@ -133,16 +133,26 @@ def test_another_kinematics_file_is_taken_and_a_broken_one_refused(shared, feet,
     assert feet.poses()['left_foot'].pose == after.pose
 
 
+ARM = """
+units: {length: mm, angle: deg}
+chains:
+  arm:
+    tip: hand
+    root_frame: base
+    joints: [lift]
+    tip_frames: {dh: {frame: h}}
+    versions:
+      a:
+        T_Ro0: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+        links:
+          - {type: prismatic, a: 0, d: 100, alpha: 0, offset: 0, range: [0, 200]}
+"""
+
+
 def test_kinematics_file_with_other_chains_needs_them_named_at_once(shared, feet, tmp_path):
     node, robot, _ = shared
     file = tmp_path / 'arm.yaml'
-    file.write_text('units: {length: mm, angle: deg}\nchains:\n  arm:\n    tip: hand\n'
-                    '    root_frame: base\n    joints: [lift]\n    tip_frames: {dh: {frame: h}}\n'
-                    '    versions:\n      a:\n'
-                    '        T_Ro0: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n'
-                    '        links:\n'
-                    '          - {type: prismatic, a: 0, d: 100, alpha: 0, offset: 0,'
-                    ' range: [0, 200]}\n')
+    file.write_text(ARM)
     result = robot.set(kinematics_file=str(file))
     assert not result.successful
     assert "unknown chain: 'left_leg'; known: arm" in result.reason
@@ -156,6 +166,26 @@ def test_kinematics_file_with_other_chains_needs_them_named_at_once(shared, feet
     assert result.successful, result.reason
     feet.stamp = robot.connect(feet.stamp)
     assert not robot.set(arm__version='a').successful  # gone with its chain
+
+
+def test_parameters_of_a_chain_that_goes_and_comes_back_say_what_holds(tmp_path):
+    arm, renamed = tmp_path / 'arm.yaml', tmp_path / 'renamed.yaml'
+    arm.write_text(ARM)
+    text = config_file('icub_kinematics.yaml').read_text()
+    renamed.write_text(text.replace('      v1:\n', '      v1b:\n'))
+    with NodeProcess({'left_leg.version': 'v1', **LOSSLESS}) as node, Robot(node) as robot:
+        feet = Feet(robot)
+        feet.check(left='v1')
+        assert robot.set(kinematics_file=str(arm), chains=['arm'], version='a').successful
+        assert robot.set(kinematics_file='', chains=['left_leg', 'right_leg'],
+                         version='v2_5').successful
+        feet.stamp = robot.connect(feet.stamp)
+        feet.check()
+        values = robot.result(robot.parameters().get_parameters(['left_leg.version'])).values
+        assert values[0].string_value == ''
+        assert robot.set(kinematics_file=str(renamed)).successful
+        described = robot.result(robot.parameters().describe_parameters(['left_leg.version']))
+        assert described.descriptors[0].additional_constraints.startswith('v1b, v2_5')
 
 
 @pytest.mark.parametrize('changes, words', [

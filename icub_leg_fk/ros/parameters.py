@@ -10,7 +10,12 @@ from icub_leg_fk.kinematics import Catalog
 from icub_leg_fk.kinematics.catalog import FOOT_FRAMES
 from icub_leg_fk.ros.configuration import Configuration, STAMP_SOURCES, version_parameter
 from icub_leg_fk.ros.qos_overrides import check_qos_override, PREFIX
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    ParameterDescriptor,
+    ParameterType,
+    SetParametersResult,
+)
 from rclpy.exceptions import ParameterException, ParameterUninitializedException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -24,6 +29,15 @@ class _Parameter(NamedTuple):
     description: str
     constraints: str = ''
     largest: float | None = None
+
+    def descriptor(self) -> ParameterDescriptor:
+        """Return what `ros2 param describe` shows."""
+        descriptor = ParameterDescriptor(description=self.description,
+                                         additional_constraints=self.constraints)
+        if self.largest is not None:
+            descriptor.floating_point_range = [
+                FloatingPointRange(from_value=0.0, to_value=self.largest, step=0.0)]
+        return descriptor
 
 
 _PARAMETERS = (
@@ -70,7 +84,8 @@ class NodeParameters:
         for parameter in _PARAMETERS:
             self._declare(parameter)
         self._catalog = Catalog.load(node.get_parameter('kinematics_file').value)
-        self._declare_versions()
+        for parameter in self._version_parameters():
+            self._declare(parameter)
         self._refuse_unknown()
         self.configuration = Configuration.from_parameters(self._values(), self._catalog)
         self._declaring = False
@@ -80,25 +95,37 @@ class NodeParameters:
         node.add_post_set_parameters_callback(self._adopt)
 
     def _declare(self, parameter: _Parameter) -> None:
-        descriptor = ParameterDescriptor(description=parameter.description,
-                                         additional_constraints=parameter.constraints)
-        if parameter.largest is not None:
-            descriptor.floating_point_range = [
-                FloatingPointRange(from_value=0.0, to_value=parameter.largest, step=0.0)]
         try:
-            self._node.declare_parameter(parameter.name, parameter.default, descriptor)
+            self._node.declare_parameter(parameter.name, parameter.default,
+                                         parameter.descriptor())
         except ParameterException as error:
             overrides = self._node._parameter_overrides
             raise ParameterError(
                 f'parameter {parameter.name}: found {overrides[parameter.name].value!r}, allowed: '
                 f'{parameter.constraints or _kind(parameter)}') from error
 
-    def _declare_versions(self) -> None:
-        for chain, entry in self._catalog.chains.items():
-            if not self._node.has_parameter(version_parameter(chain)):
-                self._declare(_Parameter(
-                    version_parameter(chain), '', f'Version of {chain}; empty is that of version.',
-                    f'{", ".join(entry.versions)}, or empty'))
+    def _version_parameters(self) -> list[_Parameter]:
+        return [_Parameter(version_parameter(chain), '',
+                           f'Version of {chain}; empty is that of version.',
+                           f'{", ".join(entry.versions)}, or empty')
+                for chain, entry in self._catalog.chains.items()]
+
+    def _redeclare_versions(self, catalog: Catalog) -> None:
+        """Go over to the chains of another catalog; what was given at start holds no more."""
+        dropped = self._catalog.chains.keys() - catalog.chains.keys()
+        self._catalog = catalog
+        self._declaring = True
+        for chain in dropped:
+            self._node.undeclare_parameter(version_parameter(chain))
+        for parameter in self._version_parameters():
+            descriptor = parameter.descriptor()
+            if self._node.has_parameter(parameter.name):
+                descriptor.type = ParameterType.PARAMETER_STRING
+                self._node.set_descriptor(parameter.name, descriptor)
+            else:
+                self._node.declare_parameter(parameter.name, parameter.default, descriptor,
+                                             ignore_override=True)
+        self._declaring = False
 
     def _refuse_unknown(self) -> None:
         """Refuse overrides that name no parameter, which rclpy would pass over in silence."""
@@ -153,13 +180,8 @@ class NodeParameters:
         if self._candidate is None:
             return
         (catalog, self.configuration), self._candidate = self._candidate, None
-        dropped = self._catalog.chains.keys() - catalog.chains.keys()
-        self._catalog = catalog
-        self._declaring = True
-        for chain in dropped:
-            self._node.undeclare_parameter(version_parameter(chain))
-        self._declare_versions()
-        self._declaring = False
+        if catalog is not self._catalog:
+            self._redeclare_versions(catalog)
         self._apply(self.configuration)
 
 
