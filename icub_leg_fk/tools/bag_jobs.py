@@ -66,7 +66,7 @@ def convert_all(tasks: Sequence[Task], conversion: Conversion, jobs: int,
     try:
         while waiting or working:
             while waiting and len(working) < jobs:
-                worker = idle.pop() if idle else _Worker(conversion)
+                worker = idle.pop() if idle else _Worker(conversion, list(working))
                 index, task = waiting.pop(0)
                 worker.pipe.send(task)
                 working[worker.pipe] = worker, index
@@ -92,16 +92,22 @@ def convert_all(tasks: Sequence[Task], conversion: Conversion, jobs: int,
 class _Worker:
     """A process that converts one bag after another.
 
+    Args:
+        conversion: what to do with each.
+        others: the pipes of the other workers.
+
     Attributes:
         pipe: takes tasks.
         process: the process.
     """
 
-    def __init__(self, conversion: Conversion) -> None:
-        # Not forked: a fork copies the threads of numpy's libraries in whatever state they are.
-        context = get_context('spawn')
+    def __init__(self, conversion: Conversion, others: Sequence[Connection]) -> None:
+        # Forked, since a new interpreter takes as long to start as half a minute of recording to
+        # convert. No thread of Python's runs here, and numpy's BLAS sets itself up anew.
+        context = get_context('fork')
         self.pipe, theirs = context.Pipe()
-        self.process = context.Process(target=_work, args=(theirs, conversion), daemon=True)
+        self.process = context.Process(
+            target=_work, args=(theirs, conversion, [self.pipe, *others]), daemon=True)
         self.process.start()
         theirs.close()
 
@@ -115,8 +121,10 @@ class _Worker:
             return 'the process that worked on it was killed'
 
 
-def _work(pipe: Connection, conversion: Conversion) -> None:
+def _work(pipe: Connection, conversion: Conversion, inherited: Sequence[Connection]) -> None:
     """Convert bags and report; ends at once if there is nobody left to report to."""
+    for end in inherited:  # an open copy here would hide that the parent has gone
+        end.close()
     last = 0.0
 
     def report(share: float) -> None:
