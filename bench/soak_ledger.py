@@ -56,7 +56,7 @@ class Ledger:
         self._say(f'unexpected pose at {stamp}')
         return None
 
-    def open(self) -> bool:
+    def waits(self) -> bool:
         """Return whether a certain promise is open."""
         return any(promise.certain for promise in self._open)
 

@@ -101,7 +101,7 @@ class SoakRobot:
     def settle(self, seconds: float = 5.0) -> None:
         """Wait until every promise is kept, and count those that are not."""
         end = time.monotonic() + seconds
-        while any(ledger.open() for ledger in self.ledgers.values()) and time.monotonic() < end:
+        while any(ledger.waits() for ledger in self.ledgers.values()) and time.monotonic() < end:
             self._executor.spin_once(timeout_sec=0.05)
         for ledger in self.ledgers.values():
             ledger.close()

@@ -247,7 +247,7 @@ class Robot:
         self.until(future.done, 'answer of a service')
         return future.result()
 
-    def set(self, **values):
+    def change(self, **values):
         """Set parameters atomically (`__` stands for a dot) and return the result."""
         changes = [Parameter(name.replace('__', '.'), value=value)
                    for name, value in values.items()]

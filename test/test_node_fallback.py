@@ -39,7 +39,7 @@ def test_rules_parameters_and_diagnostics_are_the_same(shared):
     robot.send(start + MS, LEFT, [0.1] * 6)
     robot.send(start + MS + 1, BOTH, [0.1] * 11)
     robot.joints.publish(b'\x00\x01\x00\x00')
-    assert robot.set(version='v1').successful
+    assert robot.change(version='v1').successful
     robot.send(start + MS + 2, BOTH, [0.1] * 12)
     left = robot.take(robot.left, start + MS + 2)
     assert left.stamps() == [start + MS, start + MS + 2]

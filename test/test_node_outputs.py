@@ -136,13 +136,13 @@ def test_twist_is_the_derivative_of_the_pose_on_the_recorded_walk(twists):
 
 def test_frame_prefix_holds_for_twists_and_topics_go_when_they_are_switched_off(twists):
     robot, node = twists.robot, twists.node
-    assert robot.set(frame_prefix='a/').successful
+    assert robot.change(frame_prefix='a/').successful
     twists.send(Q, np.ones(12))
     _, answers = twists.settle()
     assert answers['left_foot'][0].header.frame_id == 'a/root_link'
     topic = node.topic('left_foot/twist')
     assert robot.node.count_publishers(topic) == 1
-    assert robot.set(publish_twist=False, frame_prefix='').successful
+    assert robot.change(publish_twist=False, frame_prefix='').successful
     robot.until(lambda: robot.node.count_publishers(topic) == 0, 'the twist topic to go')
 
 
@@ -170,7 +170,7 @@ def test_skeletons_go_through_the_frames_of_each_leg():
         # Viewers forget the skeletons of chains that are dropped.
         robot.spin()
         inbox.clear()
-        assert robot.set(chains=['right_leg']).successful
+        assert robot.change(chains=['right_leg']).successful
         robot.until(lambda: any(array.markers[0].action == Marker.DELETEALL for array in inbox),
                     'removal of the skeletons')
 
@@ -179,7 +179,7 @@ def test_transforms_are_refused_in_one_line_where_tf2_ros_is_missing(twists):
     try:
         import tf2_ros
     except ImportError:
-        result = twists.robot.set(publish_tf=True)
+        result = twists.robot.change(publish_tf=True)
         assert not result.successful
         assert 'tf2_ros' in result.reason
         assert '\n' not in result.reason

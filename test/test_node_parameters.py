@@ -68,7 +68,7 @@ def feet(shared):
 ], ids=str)
 def test_change_shows_in_the_very_next_poses(feet, changes, expected):
     feet.check()
-    result = feet.robot.set(**changes)
+    result = feet.robot.change(**changes)
     assert result.successful, result.reason
     feet.check(**expected)
 
@@ -77,7 +77,7 @@ def test_joint_timeout_changes_live(feet):
     feet.poses()
     robot, late = feet.robot, feet.stamp + SECOND
     robot.send(late, LEFT[:3], Q[:3])  # the others are too old now
-    assert robot.set(joint_timeout=2.0).successful
+    assert robot.change(joint_timeout=2.0).successful
     robot.send(late + 1, LEFT[:3], Q[:3])
     assert robot.take(robot.left, late + 1).stamps() == [late + 1]
     feet.stamp = late + 1
@@ -85,7 +85,7 @@ def test_joint_timeout_changes_live(feet):
 
 def test_stamps_change_live(feet):
     robot = feet.robot
-    assert robot.set(stamp_source='now').successful
+    assert robot.change(stamp_source='now').successful
     before = robot.node.get_clock().now().nanoseconds
     robot.send(feet.stamp)
     robot.until(lambda: robot.right, 'a pose')
@@ -102,14 +102,14 @@ def publishers(robot, topic):
 def test_publishers_of_dropped_chains_go_and_those_of_new_ones_come(shared, feet):
     node, robot, _ = shared
     left, head = node.topic('left_foot/pose'), node.topic('head_imu/pose')
-    result = robot.set(chains=['head_imu', 'right_leg'], head_imu__version='v2')
+    result = robot.change(chains=['head_imu', 'right_leg'], head_imu__version='v2')
     assert result.successful, result.reason
     robot.until(lambda: not publishers(robot, left), 'left foot gone')
     robot.until(lambda: publishers(robot, head), 'head there')
     inbox = robot.listen(PoseStamped, head)
     feet.stamp = robot.connect(feet.stamp, (*BOTH, *HEAD), [robot.right, inbox])
     assert robot.left == []
-    assert robot.set(chains=['left_leg', 'right_leg']).successful
+    assert robot.change(chains=['left_leg', 'right_leg']).successful
     robot.until(lambda: publishers(robot, left) and not publishers(robot, head), 'feet again')
     feet.stamp = robot.connect(feet.stamp)
     feet.check()
@@ -121,12 +121,12 @@ def test_another_kinematics_file_is_taken_and_a_broken_one_refused(shared, feet,
     longer = tmp_path / 'longer.yaml'
     longer.write_text(text.replace('[0,  0, 1,  -68.1]', '[0,  0, 1, -168.1]'))
     before = feet.poses()['left_foot']
-    assert robot.set(kinematics_file=str(longer)).successful
+    assert robot.change(kinematics_file=str(longer)).successful
     after = feet.poses()['left_foot']
     assert after.pose.position.y == pytest.approx(before.pose.position.y - 0.1, abs=1e-12)
     broken = tmp_path / 'broken.yaml'
     broken.write_text(text.replace('alpha: -90', 'alpha: left'))
-    result = robot.set(kinematics_file=str(broken))
+    result = robot.change(kinematics_file=str(broken))
     assert not result.successful
     assert 'left_leg' in result.reason
     assert '\n' not in result.reason
@@ -153,19 +153,19 @@ def test_kinematics_file_with_other_chains_needs_them_named_at_once(shared, feet
     node, robot, _ = shared
     file = tmp_path / 'arm.yaml'
     file.write_text(ARM)
-    result = robot.set(kinematics_file=str(file))
+    result = robot.change(kinematics_file=str(file))
     assert not result.successful
     assert "unknown chain: 'left_leg'; known: arm" in result.reason
-    result = robot.set(kinematics_file=str(file), chains=['arm'], version='a')
+    result = robot.change(kinematics_file=str(file), chains=['arm'], version='a')
     assert result.successful, result.reason
     hand = robot.listen(PoseStamped, node.topic('hand/pose'))
     feet.stamp = robot.connect(feet.stamp, ['lift'], [hand])
     assert hand[-1].pose.position.z == pytest.approx(0.1 - 0.01, abs=1e-12)
-    assert robot.set(arm__version='a').successful
-    result = robot.set(kinematics_file='', chains=['left_leg', 'right_leg'], version='v2_5')
+    assert robot.change(arm__version='a').successful
+    result = robot.change(kinematics_file='', chains=['left_leg', 'right_leg'], version='v2_5')
     assert result.successful, result.reason
     feet.stamp = robot.connect(feet.stamp)
-    assert not robot.set(arm__version='a').successful  # gone with its chain
+    assert not robot.change(arm__version='a').successful  # gone with its chain
 
 
 def test_parameters_of_a_chain_that_goes_and_comes_back_say_what_holds(tmp_path):
@@ -176,14 +176,14 @@ def test_parameters_of_a_chain_that_goes_and_comes_back_say_what_holds(tmp_path)
     with NodeProcess({'left_leg.version': 'v1', **LOSSLESS}) as node, Robot(node) as robot:
         feet = Feet(robot)
         feet.check(left='v1')
-        assert robot.set(kinematics_file=str(arm), chains=['arm'], version='a').successful
-        assert robot.set(kinematics_file='', chains=['left_leg', 'right_leg'],
-                         version='v2_5').successful
+        assert robot.change(kinematics_file=str(arm), chains=['arm'], version='a').successful
+        assert robot.change(kinematics_file='', chains=['left_leg', 'right_leg'],
+                            version='v2_5').successful
         feet.stamp = robot.connect(feet.stamp)
         feet.check()
         values = robot.result(robot.parameters().get_parameters(['left_leg.version'])).values
         assert values[0].string_value == ''
-        assert robot.set(kinematics_file=str(renamed)).successful
+        assert robot.change(kinematics_file=str(renamed)).successful
         described = robot.result(robot.parameters().describe_parameters(['left_leg.version']))
         assert described.descriptors[0].additional_constraints.startswith('v1b, v2_5')
 
@@ -212,7 +212,7 @@ def test_parameters_of_a_chain_that_goes_and_comes_back_say_what_holds(tmp_path)
     ({'use_sim_time': None}, ['cannot be undeclared']),
 ], ids=str)
 def test_bad_set_is_refused_with_the_choices_and_changes_nothing(feet, changes, words):
-    result = feet.robot.set(**changes)
+    result = feet.robot.change(**changes)
     assert not result.successful
     for word in words:
         assert word in result.reason
