@@ -8,6 +8,7 @@ import struct
 
 from bag_files import entries, LEFT_POSE, poses_of, read_bag, walk, write_bag
 from icub_leg_fk.tools import bag_mcap_records as mcap
+from icub_leg_fk.tools.leg_fk import main
 from leg_fk_process import assert_one_line_complaint, leg_fk
 import pytest
 
@@ -120,22 +121,45 @@ def test_chunks_behind_a_damaged_place_are_found_with_the_index(tmp_path, whole)
     assert is_subsequence(found, messages)
 
 
-def test_noise_in_an_mcap_file_never_ends_in_a_traceback(tmp_path, whole):
-    data = whole[2]
-    noise = random.Random(2)
-    for number in range(12):
-        damaged = bytearray(data)
-        for _ in range(noise.choice((1, 3, 30))):
-            place = noise.randrange(len(data))
-            damaged[place:place + 8] = noise.randbytes(min(8, len(data) - place))
-        if number % 3 == 0:  # in the summary
-            damaged[-noise.randrange(8, 400)] ^= 0xff
-        (tmp_path / 'noise.mcap').write_bytes(damaged)
-        done = leg_fk('bag', tmp_path / 'noise.mcap', tmp_path / f'out{number}')
-        assert 'Traceback' not in done.stderr, done.stderr
-        assert done.returncode in (0, 1, 2)
-        assert done.stderr.count('\n') == (done.returncode == 2)
-        assert (tmp_path / f'out{number}').exists() == (done.returncode != 2)
+def damaged(data, dice):
+    """Return a file's bytes with some of them changed, lost or added, near its ends above all."""
+    data = bytearray(data)
+    for _ in range(dice.choice((1, 1, 3, 30))):
+        place = dice.choice((dice.randrange(len(data)), dice.randrange(min(400, len(data))),
+                             len(data) - 1 - dice.randrange(min(1500, len(data)))))
+        kind = dice.choice(('bit', 'number', 'number', 'lost', 'added'))
+        if kind == 'bit':
+            data[place] ^= 1 << dice.randrange(8)
+        elif kind == 'number':
+            data[place:place + 8] = dice.choice((b'\xff' * 8, bytes(8), dice.randbytes(8)))
+        elif kind == 'lost':
+            del data[place:place + dice.randrange(1, 300)]
+        else:
+            data[place:place] = dice.randbytes(dice.randrange(1, 50))
+        data = data or bytearray(b'x')
+    return bytes(data)
+
+
+@pytest.mark.parametrize(('storage', 'compression'), [
+    ('mcap', None), ('mcap', 'storage'), ('mcap', 'file'), ('sqlite3', None),
+    ('sqlite3', 'message')])
+def test_no_damage_ends_in_an_exception(tmp_path, capsys, storage, compression):
+    """In this process, where an exception that is not one line for the user comes through."""
+    dice = random.Random(f'{storage} {compression}')
+    write_bag(tmp_path / 'in', storage, joints=walk(60), compression=compression)
+    file = next(path for path in (tmp_path / 'in').iterdir() if path.name != 'metadata.yaml')
+    data = file.read_bytes()
+    statuses = []
+    for number in range(60):
+        file.write_bytes(damaged(data, dice))
+        status = main(['bag', str(tmp_path / 'in'), str(tmp_path / f'out{number}'), '--storage',
+                       dice.choice(('mcap', 'sqlite3'))])
+        statuses.append(status)
+        output, errors = capsys.readouterr()
+        assert errors.count('\n') == (status == 2), errors
+        assert (tmp_path / f'out{number}').exists() == (status != 2), output
+        assert '.partial' not in ' '.join(entries(tmp_path))
+    assert len(set(statuses)) > 1 and set(statuses) <= {0, 1, 2}
 
 
 @pytest.mark.parametrize('content', [b'', b'\x89MCAP', b'\x89MCAP0\r\n', b'nonsense' * 1000])

@@ -11,6 +11,7 @@ from icub_leg_fk.tools import bag_mcap_records as mcap
 from icub_leg_fk.tools.bag_mcap_scan import McapScan, span_data
 from icub_leg_fk.tools.bag_topics import Message
 
+_LATEST = (1 << 63) - 1  # ns; ROS 2 has signed times
 _log_time = itemgetter(2)
 
 
@@ -30,6 +31,7 @@ class McapFile:
         self.path = path
         self.done = 0
         self._nameless: set[int] = set()
+        self._timeless = 0
         with path.open('rb') as file:
             scan = McapScan(file, path.stat().st_size)
         self.topics, self.damage, self.attachments = scan.topics, scan.damage, scan.attachments
@@ -60,6 +62,8 @@ class McapFile:
                     ready, held = held[:count], held[count:]
                 if ready:
                     yield ready
+        if self._timeless:
+            self.damage.append(f'{self._timeless} messages with an impossible time')
         if self._nameless:
             self.damage.append(f'messages without a topic, on {len(self._nameless)} channels')
 
@@ -80,7 +84,9 @@ class McapFile:
             start, at = at + head, at + mcap.RECORD.size + length
             if number != mcap.MESSAGE or not start <= at <= size:
                 continue
-            if channel in indices:
+            if log_time > _LATEST:
+                self._timeless += 1
+            elif channel in indices:
                 if log_time < latest:
                     in_order = False
                 latest = log_time

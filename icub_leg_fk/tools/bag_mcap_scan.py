@@ -53,7 +53,6 @@ class McapScan:
         if start != mcap.MAGIC:
             found = f'starts with {start.hex(" ")}' if start else 'is empty'
             self.damage.append(f'is no MCAP file: {found}')
-            return
         stopped = self._walk(len(mcap.MAGIC))
         if stopped is not None:
             self._use_index(stopped)
@@ -68,7 +67,7 @@ class McapScan:
         Returns:
             None if the footer was reached; else the offset where nothing more could be read.
         """
-        self._file.seek(at)
+        self._file.seek(min(at, self._size))
         while records:
             records -= 1
             head = self._file.read(mcap.RECORD.size)
