@@ -13,6 +13,8 @@ from leg_fk_process import assert_one_line_complaint, leg_fk
 import pytest
 
 FOOTER = 37  # bytes of footer and magic
+BAD_TEXT = (r'rosbag2_bagfile_information: {storage_identifier: "\ud800", '
+            'topics_with_message_count: []}')
 
 
 def messages_of(target):
@@ -183,7 +185,7 @@ def test_a_bag_without_metadata_is_read(tmp_path, storage):
 
 
 @pytest.mark.parametrize('text', ['', 'x: [', '- 1', 'rosbag2_bagfile_information: {version: 9}',
-                                  '&a [*a]', '\x00', 'rosbag2_bagfile_information: 5'])
+                                  '&a [*a]', '\x00', BAD_TEXT, 'rosbag2_bagfile_information: 5'])
 def test_a_bag_with_broken_metadata_is_read(tmp_path, text):
     write_bag(tmp_path / 'in', joints=walk(5))
     _, messages = read_bag(tmp_path / 'in')

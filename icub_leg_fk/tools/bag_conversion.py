@@ -16,7 +16,7 @@ from icub_leg_fk.ros.configuration import Configuration
 from icub_leg_fk.tools.bag_mcap_writer import McapWriter
 from icub_leg_fk.tools.bag_metadata import as_yaml, describe, metadata_file_text
 from icub_leg_fk.tools.bag_output import output_place
-from icub_leg_fk.tools.bag_poses import NODE, pose_topics, PoseAdder
+from icub_leg_fk.tools.bag_poses import pose_topics, PoseAdder
 from icub_leg_fk.tools.bag_reader import BagReader, KINDS
 from icub_leg_fk.tools.bag_sqlite_writer import SqliteWriter
 from icub_leg_fk.tools.bag_topics import JOINT_STATE, Message, TF, Topic
@@ -124,6 +124,7 @@ class _Job:
         self._wanted = set(joint_topics) if conversion.only_poses else set(range(len(bag.topics)))
         added = pose_topics(conversion.configuration, bag.topics[joint_topics[0]])
         old = [] if conversion.only_poses else bag.topics
+        self._old = len(old)
         self.topics = [*old, *_not_yet_there(bag, old, added)]
         self._adder = PoseAdder(conversion.configuration, self.topics, joint_topics,
                                 keep=not conversion.only_poses)
@@ -149,7 +150,7 @@ class _Job:
             target=target,
             copied=sum(counts) - sum(added.values()),
             added={topic.name: added[index] for index, topic in enumerate(self.topics)
-                   if index in added or topic.name.startswith(f'{NODE}/')},
+                   if index in added or index >= self._old},
             joint_states=joint_input.messages,
             rejected=dict(joint_input.counts),
             held_back={

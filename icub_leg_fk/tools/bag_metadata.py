@@ -52,17 +52,18 @@ def read_metadata(path: Path) -> OldMetadata:
         information = yaml.safe_load(path.read_text())[_HEADING]
         listed = [entry['topic_metadata'] for entry in information['topics_with_message_count']]
         return OldMetadata(
-            storage=str(information['storage_identifier']),
-            files=tuple(Path(str(name)).name for name in information['relative_file_paths']),
+            storage=_text(information['storage_identifier']),
+            files=tuple(Path(_text(name)).name for name in information['relative_file_paths']),
             message_compression=str(
                 information.get('compression_mode', '')).lower() == 'message',
             topics=tuple(Topic(
-                entry['name'], entry['type'], entry['serialization_format'],
+                _text(entry['name']), _text(entry['type']), _text(entry['serialization_format']),
                 _qos_text(entry.get('offered_qos_profiles')),
-                str(entry.get('type_description_hash') or '')) for entry in listed),
-            custom_data={str(key): str(value) for key, value in
+                _text(entry.get('type_description_hash') or '')) for entry in listed),
+            custom_data={_text(key): _text(value) for key, value in
                          (information.get('custom_data') or {}).items()})
-    except (yaml.YAMLError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except (yaml.YAMLError, KeyError, TypeError, AttributeError, RecursionError,
+            UnicodeError) as error:
         raise ValueError('damaged') from error
 
 
@@ -123,11 +124,18 @@ class _PlainDumper(yaml.SafeDumper):
         return True
 
 
+def _text(value: Any) -> str:
+    """Return a value as text; raises UnicodeEncodeError if no file could hold that."""
+    text = str(value)
+    text.encode()
+    return text
+
+
 def _qos_text(profiles: Any) -> str:
     """Return offered QoS profiles, which stand as text or as a list, as text."""
     if isinstance(profiles, list):
         return yaml.safe_dump(profiles, sort_keys=False).strip() if profiles else ''
-    return str(profiles or '')
+    return _text(profiles or '')
 
 
 def _profiles(qos: str) -> list[dict[str, Any]]:

@@ -42,11 +42,17 @@ class SqliteFile:
         self.topics: dict[int, Topic] = {}
         self.damage: list[str] = []
         self.done = 0
+        log = Path(f'{path}-wal')
+        self._access = 'mode=ro' if log.exists() and log.stat().st_size else 'immutable=1'
         try:
-            with closing(self._connect()) as database:
-                self._describe(database)
+            self._describe()
         except (sqlite3.Error, ValueError) as error:
-            self.damage.append(f'topics cannot be read: {error}')
+            self._access = 'immutable=1'
+            try:
+                self._describe()
+                self.damage.append(f'write-ahead log cannot be read: {error}')
+            except (sqlite3.Error, ValueError):
+                self.damage.append(f'topics cannot be read: {error}')
 
     def blocks(self, indices: Mapping[int, int]) -> Iterator[list[Message]]:
         """Yield the messages in order of their time, some at a time.
@@ -61,28 +67,28 @@ class SqliteFile:
 
     def _connect(self) -> sqlite3.Connection:
         """Open the file for reading; with its write-ahead log, if a killed recorder left one."""
-        log = Path(f'{self.path}-wal')
-        access = 'mode=ro' if log.exists() and log.stat().st_size else 'immutable=1'
-        database = sqlite3.connect(f'file:{quote(str(self.path))}?{access}', uri=True)
+        database = sqlite3.connect(f'file:{quote(str(self.path))}?{self._access}', uri=True)
         # Without this, sqlite refuses a file that is shorter than its header says.
         database.execute('PRAGMA writable_schema = ON')
         database.text_factory = lambda data: data.decode('utf-8', 'replace')
         return database
 
-    def _describe(self, database: sqlite3.Connection) -> None:
+    def _describe(self) -> None:
         # Older recorders had fewer columns and no definitions; see rosbag2's sqlite_storage.cpp.
-        known = {row[1] for row in database.execute('PRAGMA table_info(topics)')}
-        columns = ', '.join(
-            column if column in known else "''" for column in
-            ('name', 'type', 'serialization_format', 'offered_qos_profiles',
-             'type_description_hash'))
-        definitions = {}
-        if database.execute('PRAGMA table_info(message_definitions)').fetchall():
-            definitions = {row[0]: row[1:] for row in database.execute(
-                'SELECT topic_type, encoding, encoded_message_definition '
-                'FROM message_definitions')}
-        for number, *fields in database.execute(f'SELECT id, {columns} FROM topics ORDER BY id'):
-            self.topics[number] = Topic(*fields, *definitions.get(fields[1], ('', '')))
+        with closing(self._connect()) as database:
+            known = {row[1] for row in database.execute('PRAGMA table_info(topics)')}
+            columns = ', '.join(
+                column if column in known else "''" for column in
+                ('name', 'type', 'serialization_format', 'offered_qos_profiles',
+                 'type_description_hash'))
+            definitions = {}
+            if database.execute('PRAGMA table_info(message_definitions)').fetchall():
+                definitions = {row[0]: row[1:] for row in database.execute(
+                    'SELECT topic_type, encoding, encoded_message_definition '
+                    'FROM message_definitions')}
+            for number, *fields in database.execute(
+                    f'SELECT id, {columns} FROM topics ORDER BY id'):
+                self.topics[number] = Topic(*fields, *definitions.get(fields[1], ('', '')))
 
     def _blocks(self, database: sqlite3.Connection,
                 indices: Mapping[int, int]) -> Iterator[list[Message]]:
