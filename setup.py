@@ -8,12 +8,14 @@ PACKAGE = 'icub_leg_fk'
 SHARE = f'share/{PACKAGE}'
 
 ROS = ['ros-jazzy-common-interfaces', 'ros-jazzy-rclpy', 'ros-jazzy-rmw-fastrtps-cpp']
-TOOLS = ['matplotlib>=3.6', 'rosbags>=0.10', 'sympy']
+TOOLS = ['lz4', 'matplotlib>=3.6', 'sympy', 'zstandard']
 TEST = [
     'colcon-common-extensions',
     'hypothesis',
+    'mcap',
     'pin',
     'pytest>=7.4',
+    'rosbags>=0.10',
     'setuptools<80',
 ]
 LINT = [
