@@ -7,7 +7,7 @@ import sqlite3
 import struct
 
 from bag_files import entries, LEFT_POSE, poses_of, read_bag, walk, write_bag
-from icub_leg_fk.tools import bag_mcap_records as mcap
+from icub_leg_fk.tools.bags import mcap_records as mcap
 from icub_leg_fk.tools.leg_fk import main
 from leg_fk_process import assert_one_line_complaint, leg_fk
 import pytest

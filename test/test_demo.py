@@ -18,8 +18,8 @@ pytest.importorskip('matplotlib')
 
 from icub_leg_fk.kinematics import Catalog
 from icub_leg_fk.tools.demo import conclude
-from icub_leg_fk.tools.demo_node import NodeError, NodeProcess
-from icub_leg_fk.tools.demo_replay import Answers, Replay
+from icub_leg_fk.tools.demonstration.node import NodeError, NodeProcess
+from icub_leg_fk.tools.demonstration.replay import Answers, Replay
 from icub_leg_fk.tools.gait import walk
 from icub_leg_fk.tools.leg_fk import main
 

@@ -13,10 +13,10 @@ import pytest
 pytest.importorskip('matplotlib')
 
 from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.tools.drawing.over_time import gaps, violations
+from icub_leg_fk.tools.drawing.pictures import feet_figure
 from icub_leg_fk.tools.gait import walk
 from icub_leg_fk.tools.leg_fk import main
-from icub_leg_fk.tools.pictures import feet_figure
-from icub_leg_fk.tools.pictures_time import gaps, violations
 from icub_leg_fk.tools.plot import chosen_chains, telling_instants
 from icub_leg_fk.tools.recording import ChainTrack
 
@@ -341,7 +341,7 @@ def test_missing_matplotlib_is_one_line(walking_csv):
 
 def test_axes_drawn_in_the_documentation_point_as_they_are_labelled(monkeypatch, tmp_path):
     """Label and frame agree: `forward` is drawn where -x of the root points, and so on."""
-    from icub_leg_fk.tools import pictures_docs, pictures_legs
+    from icub_leg_fk.tools.drawing import docs, legs
 
     directions = {'backward': (1, 0, 0), 'forward': (-1, 0, 0), 'toward the toes': (-1, 0, 0),
                   'right': (0, 1, 0), 'left': (0, -1, 0), 'up': (0, 0, 1)}
@@ -349,15 +349,15 @@ def test_axes_drawn_in_the_documentation_point_as_they_are_labelled(monkeypatch,
 
     def look(view, T, length, width, zorder, labels=()):
         drawn.extend((label.partition('  ')[2], T[:3, i]) for i, label in enumerate(labels))
-    monkeypatch.setattr(pictures_legs, 'draw_triad', look)
-    pictures_docs.frames_figure(Catalog.load())
+    monkeypatch.setattr(legs, 'draw_triad', look)
+    docs.frames_figure(Catalog.load())
     assert len(drawn) == 9
     for label, axis in drawn:
         assert np.allclose(axis, directions[label], atol=1e-9), label
 
 
 def test_pictures_of_the_documentation_can_be_made_anew(tmp_path):
-    subprocess.run([sys.executable, '-m', 'icub_leg_fk.tools.pictures_docs', tmp_path], check=True,
+    subprocess.run([sys.executable, '-m', 'icub_leg_fk.tools.drawing.docs', tmp_path], check=True,
                    cwd=Path(__file__).parents[1])
     sizes = {path.name: path.stat().st_size for path in tmp_path.iterdir()}
     assert sizes.keys() == {'frames.png', 'legs.png', 'walking.png'}

@@ -14,8 +14,8 @@ from icub_leg_fk.tools.chain_arguments import add_kinematics_file, DEFAULT_VERSI
 
 if TYPE_CHECKING:
     from icub_leg_fk.ros.configuration import Configuration
-    from icub_leg_fk.tools.bag_conversion import Conversion
-    from icub_leg_fk.tools.bag_jobs import Outcome, Task
+    from icub_leg_fk.tools.bags.conversion import Conversion
+    from icub_leg_fk.tools.bags.jobs import Outcome, Task
 
 HELP = 'copy a bag and add the poses of the feet, as the node would have published them'
 EXAMPLES = """\
@@ -78,7 +78,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Convert the bags."""
-    from icub_leg_fk.tools.bag_conversion import Conversion
+    from icub_leg_fk.tools.bags.conversion import Conversion
 
     tasks = _tasks(args)
     conversion = Conversion(_configuration(args), args.joint_topic, args.only_poses,
@@ -94,7 +94,7 @@ def _positive_integer(text: str) -> int:
 
 def _tasks(args: argparse.Namespace) -> list[Task]:
     """Return which bag is to become which."""
-    from icub_leg_fk.tools.bag_jobs import Task
+    from icub_leg_fk.tools.bags.jobs import Task
 
     if args.out_dir is None:
         if len(args.bags) != 2:
@@ -114,7 +114,7 @@ def _tasks(args: argparse.Namespace) -> list[Task]:
 
 def _name(bag: Path, storage: str | None) -> str:
     """Return the name of the new bag: that of the old one, with the ending of its storage."""
-    from icub_leg_fk.tools.bag_reader import KINDS
+    from icub_leg_fk.tools.bags.reader import KINDS
 
     name = re.sub(r'(\.mcap|\.db3)\.zstd$', r'\1', os.path.basename(os.path.abspath(bag)))
     stem, ending = os.path.splitext(name)
@@ -158,9 +158,9 @@ def _as_options(text: str) -> str:
 
 def _convert(tasks: list[Task], conversion: Conversion, jobs: int) -> int:
     """Convert the bags, tell about each, and return the exit status."""
-    from icub_leg_fk.tools.bag_conversion import Summary
-    from icub_leg_fk.tools.bag_jobs import convert_all, convert_one
-    from icub_leg_fk.tools.bag_report import ProgressBar, summary_lines
+    from icub_leg_fk.tools.bags.conversion import Summary
+    from icub_leg_fk.tools.bags.jobs import convert_all, convert_one
+    from icub_leg_fk.tools.bags.report import ProgressBar, summary_lines
 
     bar = ProgressBar()
     status = 0

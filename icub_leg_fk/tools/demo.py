@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from icub_leg_fk.kinematics import Chain
-    from icub_leg_fk.tools.demo_replay import Answers
+    from icub_leg_fk.tools.demonstration.replay import Answers
     from icub_leg_fk.tools.recording import JointRecording
 
 HELP = 'the live demonstration: a walk played through the node, poses shown as they come'
@@ -53,9 +53,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Give the demonstration; return 1 if a pose is missing or the node failed."""
     from icub_leg_fk.kinematics import Catalog
-    from icub_leg_fk.tools.demo_node import exit_on_signals, NodeError, stay_on_this_machine
-    from icub_leg_fk.tools.demo_replay import ReplayError
-    from icub_leg_fk.tools.pictures_style import check_output
+    from icub_leg_fk.tools.demonstration.node import (
+        exit_on_signals,
+        NodeError,
+        stay_on_this_machine,
+    )
+    from icub_leg_fk.tools.demonstration.replay import ReplayError
+    from icub_leg_fk.tools.drawing.style import check_output
 
     check_output(args.output, force=True)
     catalog = Catalog.load()
@@ -91,9 +95,9 @@ def _recording(args: argparse.Namespace, chains: Sequence[Chain]) -> JointRecord
 
 def _play(args: argparse.Namespace, recording: JointRecording, chains: Sequence[Chain]
           ) -> list[Answers]:
-    from icub_leg_fk.tools.demo_node import NodeProcess
-    from icub_leg_fk.tools.demo_replay import DEPTH, Replay
-    from icub_leg_fk.tools.demo_table import LiveTable
+    from icub_leg_fk.tools.demonstration.node import NodeProcess
+    from icub_leg_fk.tools.demonstration.replay import DEPTH, Replay
+    from icub_leg_fk.tools.demonstration.table import LiveTable
 
     # What shall not be lost must be reliable, and may wait while the machine does other things.
     joint_states = f'qos_overrides.{_namespace()}/joint_states.subscription'
@@ -113,8 +117,8 @@ def _play(args: argparse.Namespace, recording: JointRecording, chains: Sequence[
 def _draw(output: Path, source: str, recording: JointRecording, chains: Sequence[Chain],
           answers: Sequence[Answers]) -> None:
     """Draw what has arrived, if something has of each foot."""
-    from icub_leg_fk.tools.pictures import walk_figure
-    from icub_leg_fk.tools.pictures_style import save_picture
+    from icub_leg_fk.tools.drawing.pictures import walk_figure
+    from icub_leg_fk.tools.drawing.style import save_picture
     import numpy as np
 
     tracks = [recording.track(chain) for chain in chains]

@@ -36,20 +36,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the explanation."""
-    from icub_leg_fk.tools.explain_steps import Algebra, Decimals, explanation
+    from icub_leg_fk.tools.explaining.steps import Algebra, Decimals, explanation
 
     catalog, chain = load_chain(args)
     q = joint_positions(args, chain)
     algebra: Algebra = Decimals()
     if args.symbolic or q is None:
-        from icub_leg_fk.tools.explain_symbolic import Exact
+        from icub_leg_fk.tools.explaining.symbolic import Exact
         algebra = Exact()
     e = explanation(catalog.entry(chain.name), chain, args.foot_frame, q, algebra)
     if args.json:
-        from icub_leg_fk.tools.explain_json import explanation_json as render
+        from icub_leg_fk.tools.explaining.json_form import explanation_json as render
     elif args.latex:
-        from icub_leg_fk.tools.explain_latex import explanation_latex as render
+        from icub_leg_fk.tools.explaining.latex import explanation_latex as render
     else:
-        from icub_leg_fk.tools.explain_text import explanation_text as render
+        from icub_leg_fk.tools.explaining.text import explanation_text as render
     print(render(e))
     return 0

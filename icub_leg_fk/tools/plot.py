@@ -64,8 +64,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Draw the picture."""
     from icub_leg_fk.kinematics import Catalog
-    from icub_leg_fk.tools.pictures import feet_figure
-    from icub_leg_fk.tools.pictures_style import check_output, save_picture
+    from icub_leg_fk.tools.drawing.pictures import feet_figure
+    from icub_leg_fk.tools.drawing.style import check_output, save_picture
 
     output = args.output or Path(f'{args.input.resolve().stem}.png')
     check_output(output, args.force)

@@ -12,8 +12,8 @@ from icub_leg_fk.errors import InputFileError
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.ros.joint_input import JointInput
 from icub_leg_fk.ros.joint_stream import JointStream, OnReady
-from icub_leg_fk.tools.bag_reader import BagReader
-from icub_leg_fk.tools.bag_topics import JOINT_STATE
+from icub_leg_fk.tools.bags.reader import BagReader
+from icub_leg_fk.tools.bags.topics import JOINT_STATE
 from icub_leg_fk.tools.recording import ChainTrack
 import numpy as np
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 import sqlite3
 
-from icub_leg_fk.tools.bag_metadata import ROS_DISTRO, VERSION
-from icub_leg_fk.tools.bag_topics import Message, Topic
+from icub_leg_fk.tools.bags.metadata import ROS_DISTRO, VERSION
+from icub_leg_fk.tools.bags.topics import Message, Topic
 
 # Word for word what rosbag2's sqlite_storage.cpp creates. No journal: a file that was not
 # finished is never seen.

@@ -9,7 +9,7 @@ import math
 from typing import TYPE_CHECKING
 
 from icub_leg_fk.kinematics.rotation import Array
-from icub_leg_fk.tools.pictures_style import color_of, has_known_axes, INK, label_of, MINUS
+from icub_leg_fk.tools.drawing.style import color_of, has_known_axes, INK, label_of, MINUS
 from icub_leg_fk.tools.recording import ChainTrack
 import numpy as np
 from numpy.typing import NDArray

@@ -6,8 +6,8 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from icub_leg_fk.kinematics.rotation import Array
-from icub_leg_fk.tools import pictures_legs as legs
-from icub_leg_fk.tools.pictures_style import color_of, has_known_axes
+from icub_leg_fk.tools.drawing import legs as legs
+from icub_leg_fk.tools.drawing.style import color_of, has_known_axes
 from icub_leg_fk.tools.recording import ChainTrack
 import numpy as np
 

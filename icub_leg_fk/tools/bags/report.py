@@ -6,7 +6,7 @@ from pathlib import Path
 import sys
 import time
 
-from icub_leg_fk.tools.bag_conversion import Summary
+from icub_leg_fk.tools.bags.conversion import Summary
 from icub_leg_fk.tools.text import columns, indented
 
 _REFRESH_PERIOD = 0.1  # s

@@ -9,7 +9,7 @@ from typing import Any, TYPE_CHECKING
 
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
-from icub_leg_fk.tools.pictures_style import AXIS_COLORS, color_of, FAINT, GRID, INK, MINUS
+from icub_leg_fk.tools.drawing.style import AXIS_COLORS, color_of, FAINT, GRID, INK, MINUS
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -1,4 +1,4 @@
-"""The README's pictures: `python -m icub_leg_fk.tools.pictures_docs DIRECTORY`."""
+"""The README's pictures: `python -m icub_leg_fk.tools.drawing.docs DIRECTORY`."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 from icub_leg_fk.kinematics import Catalog, Chain
 from icub_leg_fk.kinematics.rotation import Array
-from icub_leg_fk.tools import pictures_legs as legs
+from icub_leg_fk.tools.drawing import legs as legs
+from icub_leg_fk.tools.drawing.pictures import feet_figure, walk_figure
+from icub_leg_fk.tools.drawing.style import color_of, FAINT, save_picture
 from icub_leg_fk.tools.gait import PERIOD, walk
-from icub_leg_fk.tools.pictures import feet_figure, walk_figure
-from icub_leg_fk.tools.pictures_style import color_of, FAINT, save_picture
 from icub_leg_fk.tools.plot import chosen_chains, telling_instants
 import numpy as np
 

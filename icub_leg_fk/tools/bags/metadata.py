@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from icub_leg_fk.tools.bag_topics import Topic
+from icub_leg_fk.tools.bags.topics import Topic
 import yaml
 
 VERSION = 9

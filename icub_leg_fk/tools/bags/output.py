@@ -16,7 +16,7 @@ import shutil
 import signal
 
 from icub_leg_fk.errors import OutputFileError
-from icub_leg_fk.tools.bag_reader import KINDS
+from icub_leg_fk.tools.bags.reader import KINDS
 
 _STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 

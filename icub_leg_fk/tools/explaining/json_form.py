@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from icub_leg_fk.tools.explain_steps import Cell, Explanation, Matrix, Step
+from icub_leg_fk.tools.explaining.steps import Cell, Explanation, Matrix, Step
 from icub_leg_fk.tools.text import json_text
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import sqlite3
 from urllib.parse import quote
 
-from icub_leg_fk.tools.bag_topics import Message, Topic
+from icub_leg_fk.tools.bags.topics import Message, Topic
 
 _BLOCK = 1 << 20  # bytes
 _ROWS = 4096

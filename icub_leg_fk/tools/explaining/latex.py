@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 
-from icub_leg_fk.tools.explain_steps import Explanation, Matrix, Step
-from icub_leg_fk.tools.explain_terms import cell_words, filled, LATEX, symbol_latex, terms
-from icub_leg_fk.tools.explain_text import (
+from icub_leg_fk.tools.explaining.steps import Explanation, Matrix, Step
+from icub_leg_fk.tools.explaining.terms import cell_words, filled, LATEX, symbol_latex, terms
+from icub_leg_fk.tools.explaining.text import (
     COLUMN_NAMES,
     defined_symbols,
     link_values,

@@ -16,7 +16,7 @@ import math
 
 from icub_leg_fk.errors import MissingDependencyError
 from icub_leg_fk.kinematics.rotation import Array
-from icub_leg_fk.tools.explain_steps import Cell, Matrix, product, Row, Step
+from icub_leg_fk.tools.explaining.steps import Cell, Matrix, product, Row, Step
 
 try:
     import sympy

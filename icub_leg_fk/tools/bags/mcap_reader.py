@@ -7,9 +7,9 @@ from operator import itemgetter
 from pathlib import Path
 from typing import BinaryIO
 
-from icub_leg_fk.tools import bag_mcap_records as mcap
-from icub_leg_fk.tools.bag_mcap_scan import McapScan, span_data
-from icub_leg_fk.tools.bag_topics import Message
+from icub_leg_fk.tools.bags import mcap_records as mcap
+from icub_leg_fk.tools.bags.mcap_scan import McapScan, span_data
+from icub_leg_fk.tools.bags.topics import Message
 
 _LATEST = (1 << 63) - 1  # ns; ROS 2 has signed times
 _log_time = itemgetter(2)

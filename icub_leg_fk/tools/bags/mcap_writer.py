@@ -13,9 +13,9 @@ import struct
 import zlib
 
 from icub_leg_fk import __version__
-from icub_leg_fk.tools import bag_mcap_records as mcap
-from icub_leg_fk.tools.bag_codecs import compressor
-from icub_leg_fk.tools.bag_topics import Message, Topic
+from icub_leg_fk.tools.bags import mcap_records as mcap
+from icub_leg_fk.tools.bags.codecs import compressor
+from icub_leg_fk.tools.bags.topics import Message, Topic
 
 _CHUNK_SIZE = 1 << 20
 _NEVER = 1 << 63

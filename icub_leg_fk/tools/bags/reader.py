@@ -10,11 +10,11 @@ import shutil
 from typing import NamedTuple
 
 from icub_leg_fk.errors import InputFileError
-from icub_leg_fk.tools.bag_codecs import decompress, decompress_file, ZSTD_MAGIC
-from icub_leg_fk.tools.bag_mcap_reader import McapFile
-from icub_leg_fk.tools.bag_metadata import OldMetadata, read_metadata
-from icub_leg_fk.tools.bag_sqlite_reader import SqliteFile, torn_bytes
-from icub_leg_fk.tools.bag_topics import Message, Topic
+from icub_leg_fk.tools.bags.codecs import decompress, decompress_file, ZSTD_MAGIC
+from icub_leg_fk.tools.bags.mcap_reader import McapFile
+from icub_leg_fk.tools.bags.metadata import OldMetadata, read_metadata
+from icub_leg_fk.tools.bags.sqlite_reader import SqliteFile, torn_bytes
+from icub_leg_fk.tools.bags.topics import Message, Topic
 
 KINDS: Mapping[str, tuple[str, type[McapFile] | type[SqliteFile]]] = {
     '.mcap': ('mcap', McapFile), '.db3': ('sqlite3', SqliteFile)}

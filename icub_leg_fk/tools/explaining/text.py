@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 import math
 
-from icub_leg_fk.tools.explain_steps import Cell, Explanation, Matrix, number, pi_text, Step
-from icub_leg_fk.tools.explain_terms import cell_words, filled, terms
+from icub_leg_fk.tools.explaining.steps import Cell, Explanation, Matrix, number, pi_text, Step
+from icub_leg_fk.tools.explaining.terms import cell_words, filled, terms
 from icub_leg_fk.tools.text import (
     beside,
     columns,

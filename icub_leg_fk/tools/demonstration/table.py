@@ -8,7 +8,7 @@ import shutil
 import sys
 from typing import TextIO
 
-from icub_leg_fk.tools.demo_replay import Answers
+from icub_leg_fk.tools.demonstration.replay import Answers
 import numpy as np
 
 _HEADER = ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')

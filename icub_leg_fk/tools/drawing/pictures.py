@@ -6,10 +6,10 @@ from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 from icub_leg_fk.kinematics.rotation import Array
-from icub_leg_fk.tools import pictures_legs as legs
-from icub_leg_fk.tools import pictures_time as over_time
-from icub_leg_fk.tools.pictures_scene import Stage, TRAIL
-from icub_leg_fk.tools.pictures_style import (
+from icub_leg_fk.tools.drawing import legs as legs
+from icub_leg_fk.tools.drawing import over_time as over_time
+from icub_leg_fk.tools.drawing.scene import Stage, TRAIL
+from icub_leg_fk.tools.drawing.style import (
     AXIS_COLORS,
     color_of,
     FAINT,

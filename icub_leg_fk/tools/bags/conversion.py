@@ -13,13 +13,13 @@ import time
 
 from icub_leg_fk.errors import InputFileError, OutputFileError
 from icub_leg_fk.ros.configuration import Configuration
-from icub_leg_fk.tools.bag_mcap_writer import McapWriter
-from icub_leg_fk.tools.bag_metadata import as_yaml, describe, metadata_file_text
-from icub_leg_fk.tools.bag_output import output_place
-from icub_leg_fk.tools.bag_poses import pose_topics, PoseAdder
-from icub_leg_fk.tools.bag_reader import BagReader, KINDS
-from icub_leg_fk.tools.bag_sqlite_writer import SqliteWriter
-from icub_leg_fk.tools.bag_topics import JOINT_STATE, Message, TF, Topic
+from icub_leg_fk.tools.bags.mcap_writer import McapWriter
+from icub_leg_fk.tools.bags.metadata import as_yaml, describe, metadata_file_text
+from icub_leg_fk.tools.bags.output import output_place
+from icub_leg_fk.tools.bags.poses import pose_topics, PoseAdder
+from icub_leg_fk.tools.bags.reader import BagReader, KINDS
+from icub_leg_fk.tools.bags.sqlite_writer import SqliteWriter
+from icub_leg_fk.tools.bags.topics import JOINT_STATE, Message, TF, Topic
 
 OnProgress = Callable[[float], None]
 """Called with the share that is done, 0 to 1."""

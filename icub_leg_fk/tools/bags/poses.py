@@ -17,8 +17,8 @@ from icub_leg_fk.ros.joint_input import JointInput
 from icub_leg_fk.ros.joint_stream import JointStream, OnReady
 from icub_leg_fk.ros.pose_cdr import PoseStampedEncoder
 from icub_leg_fk.ros.twist import tip_twist
-from icub_leg_fk.tools.bag_cdr import TransformEncoder, TwistStampedEncoder
-from icub_leg_fk.tools.bag_topics import Message, new_topic, POSE, TF, Topic, TWIST
+from icub_leg_fk.tools.bags.cdr import TransformEncoder, TwistStampedEncoder
+from icub_leg_fk.tools.bags.topics import Message, new_topic, POSE, TF, Topic, TWIST
 
 NODE = '/foot_pose_publisher'
 TF_TOPIC = '/tf'

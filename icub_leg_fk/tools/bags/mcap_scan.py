@@ -12,9 +12,9 @@ import struct
 from typing import BinaryIO
 import zlib
 
-from icub_leg_fk.tools import bag_mcap_records as mcap
-from icub_leg_fk.tools.bag_codecs import decompress
-from icub_leg_fk.tools.bag_topics import Topic
+from icub_leg_fk.tools.bags import mcap_records as mcap
+from icub_leg_fk.tools.bags.codecs import decompress
+from icub_leg_fk.tools.bags.topics import Topic
 
 _BLOCK = 1 << 20
 _LARGEST_DESCRIPTION = 1 << 26  # bytes of a schema or channel record

@@ -1,0 +1,1 @@
+"""The parts of the live demonstration: node, replay and table."""

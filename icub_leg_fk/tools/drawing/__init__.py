@@ -1,0 +1,1 @@
+"""Pictures of feet over time and of legs in space."""

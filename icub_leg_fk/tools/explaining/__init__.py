@@ -1,0 +1,1 @@
+"""The six steps of the Denavit-Hartenberg method, as text, LaTeX and JSON."""
