@@ -31,16 +31,16 @@ def main() -> int:
     report = Report()
     if (load := os.getloadavg()[0]) > _QUIET_LOAD:
         report.note(f'this machine is busy (load {load:.1f}); expect wide spreads')
+    if 'node' in args.parts:
+        from bench.node_bench import Effort, measure_node
+        measure_node(report, Effort(1, 50, 1, False) if args.quick
+                     else Effort(7, 1000, 6, True))
     if 'kinematics' in args.parts:
         from bench.kinematics_bench import measure_kinematics
         measure_kinematics(report, seconds=0.1 if args.quick else 1.0)
     if 'bag' in args.parts:
         from bench.bag_bench import measure_bag
         measure_bag(report, quick=args.quick)
-    if 'node' in args.parts:
-        from bench.node_bench import Effort, measure_node
-        measure_node(report, Effort(1, 50, 1, False) if args.quick
-                     else Effort(7, 1000, 5, True))
     report.write(args.json)
     print(f'\nfigures in {args.json}', end='')
     if report.growth:

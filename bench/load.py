@@ -103,6 +103,7 @@ def robot(connection: Connection) -> None:
             connection.send(_send(out.publish, gait(joints), rate, count))
         elif command == 'send_until_told':
             joints, rate = arguments
+            connection.send(None)
             while not connection.poll():
                 _send(out.publish, gait(joints), rate, round(rate * 0.05))
             connection.recv()

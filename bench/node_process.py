@@ -33,7 +33,7 @@ class Stretch(NamedTuple):
 
 
 class NodeProcess:
-    """Starts a node in a namespace and takes it down.
+    """A node in a namespace, which `start` starts and `close` ends.
 
     Args:
         namespace: the namespace, which also tells runs of the same node apart.
@@ -56,8 +56,12 @@ class NodeProcess:
                               *(f'qos_overrides.{topic}.publisher.depth:={DEPTH}'
                                 for topic in self.pose_topics)):
                 ros_arguments += ['-p', parameter]
-        self.started = time.time_ns()
-        self._process = subprocess.Popen([*command, *ros_arguments])
+        self._command = [*command, *ros_arguments]
+
+    def start(self) -> NodeProcess:
+        """Start the process."""
+        self._process = subprocess.Popen(self._command)
+        return self
 
     def cpu_ns(self) -> int:
         """Return the CPU time used so far [ns]."""
@@ -70,7 +74,11 @@ class NodeProcess:
     def close(self) -> None:
         """End the process."""
         self._process.terminate()
-        self._process.wait()
+        try:
+            self._process.wait(timeout=5.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
 
 
 class Bench:
@@ -108,16 +116,19 @@ class Bench:
         self._robot('close', node.joint_topic)
 
     def start_to_first_pose(self, node: NodeProcess) -> float:
-        """Return the time from a node's start to its first pose [s]; call it at once."""
+        """Start a node between a robot and an observer that run; return the time it takes [s]."""
         self.watch(node)
         self._robot.send('send_until_told', node.joint_topic, 32, 200.0)
+        self._robot.answer()
+        started = time.time_ns()
+        node.start()
         first = self._observer('first', node.pose_topics[0])
         self._robot('stop', '')
         if first is None:
             raise RuntimeError(f'no pose from {node.pose_topics[0]}')
         for topic in node.pose_topics:
             self._observer('take', topic, 1 << 30)
-        return float((first - node.started) / 1e9)
+        return float((first - started) / 1e9)
 
     def stretch(self, node: NodeProcess, joints: int, rate: float, count: int) -> Stretch:
         """Send messages through a node and return what was seen of them."""

@@ -2,7 +2,7 @@
 
 `bare` and `plain` are written as the rclpy tutorials show it: SingleThreadedExecutor and message
 objects. `floor` does the least that any Python node must do that answers a JointState with two
-PoseStamped. `dds`, `receive` and `decode` are the steps to the floor and from there to ours.
+PoseStamped. `dds`, `receive`, `send` and `decode` are the steps from nothing to our node.
 """
 
 from __future__ import annotations
@@ -11,42 +11,61 @@ from collections.abc import Callable
 import math
 import signal
 import sys
+from threading import Event
 import time
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped
 import numpy as np
 import rclpy
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 from sensor_msgs.msg import JointState
 
 DEPTH = 1000  # messages; every node has it in and out, so that a stall of the machine loses none
 QOS = QoSProfile(depth=DEPTH)
+STOP = Event()
 TIPS = ('left_foot', 'right_foot')
 
 
 def dds(node: Node) -> None:
     """Let the middleware receive, and never look."""
     node.create_subscription(JointState, 'joint_states', lambda message: None, QOS, raw=True)
-    while rclpy.ok():
+    while not STOP.is_set():
         time.sleep(0.25)
-
-
-def receive(node: Node) -> None:
-    """Receive bytes and drop them."""
-    _spin_events(node, lambda data: None)
 
 
 def floor(node: Node) -> None:
     """Receive bytes, send two ready-made byte strings."""
-    (left, left_bytes), (right, right_bytes) = _ready_made(node)
+    left, right = _publishers(node)
+    ready = _ready_made()
 
     def relay(data: bytes) -> None:
-        left(left_bytes)
-        right(right_bytes)
-    _spin_events(node, relay)
+        left.publish(ready)
+        right.publish(ready)
+    executor = _events_executor(node, relay)
+    while not STOP.is_set():
+        executor.spin_once(timeout_sec=0.25)
+
+
+def receive(node: Node) -> None:
+    """Receive bytes as our node does and drop them."""
+    _spin_as_ours(node, lambda data: None)
+
+
+def send(node: Node) -> None:
+    """Receive and send bytes as our node does."""
+    left, right = (publisher.handle.publish_raw for publisher in _publishers(node))
+    ready = _ready_made()
+
+    def relay(data: bytes) -> None:
+        left(ready)
+        right(ready)
+    _spin_as_ours(node, relay)
 
 
 def decode(node: Node) -> None:
@@ -58,10 +77,13 @@ def decode(node: Node) -> None:
     chains = [catalog.chain(name, 'v2_5', 'dh') for name in ('left_leg', 'right_leg')]
     stream = JointStream(JointInput(chains, 0.5), time.time_ns)
 
-    def sender(send: Callable[[bytes], None], data: bytes) -> Callable[..., None]:
-        return lambda sec, nanosec, q, qdot: send(data)
-    stream.on_ready = [sender(*ready) for ready in _ready_made(node)]
-    _spin_events(node, stream.feed)
+    ready = _ready_made()
+
+    def step(publisher: Any) -> Callable[..., None]:
+        send = publisher.handle.publish_raw
+        return lambda sec, nanosec, q, qdot: send(ready)
+    stream.on_ready = [step(publisher) for publisher in _publishers(node)]
+    _spin_as_ours(node, stream.feed)
 
 
 def bare(node: Node) -> None:
@@ -74,7 +96,7 @@ def bare(node: Node) -> None:
             pose.header.stamp = message.header.stamp
             publisher.publish(pose)
     node.create_subscription(JointState, 'joint_states', relay, QOS)
-    rclpy.spin(node)
+    _spin_plain(node)
 
 
 def plain(node: Node) -> None:
@@ -98,7 +120,7 @@ def plain(node: Node) -> None:
              pose.pose.orientation.w) = quaternion(T)
             publisher.publish(pose)
     node.create_subscription(JointState, 'joint_states', publish_poses, QOS)
-    rclpy.spin(node)
+    _spin_plain(node)
 
 
 def dh_transform(a: float, d: float, alpha: float, theta: float) -> Any:
@@ -136,30 +158,42 @@ def _publishers(node: Node) -> list[Any]:
     return [node.create_publisher(PoseStamped, f'~/{tip}/pose', QOS) for tip in TIPS]
 
 
-def _ready_made(node: Node) -> list[tuple[Callable[[bytes], None], bytes]]:
+def _ready_made() -> bytes:
     pose = PoseStamped()
     pose.header.frame_id = 'root_link'
-    data = serialize_message(pose)
-    return [(publisher.publish, data) for publisher in _publishers(node)]
+    return bytes(serialize_message(pose))
 
 
-def _spin_events(node: Node, on_message: Callable[[bytes], None]) -> None:
+def _spin_plain(node: Node) -> None:
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    while not STOP.is_set():
+        executor.spin_once(timeout_sec=0.25)
+
+
+def _events_executor(node: Node, on_message: Callable[[bytes], None]) -> Any:
     from rclpy.experimental.events_executor import EventsExecutor
     node.create_subscription(JointState, 'joint_states', on_message, QOS, raw=True)
     executor = EventsExecutor()
     executor.add_node(node)
-    while rclpy.ok():
-        executor.spin_once(timeout_sec=0.25)
+    return executor
 
 
-NODES = {node.__name__: node for node in (bare, plain, dds, receive, floor, decode)}
+def _spin_as_ours(node: Node, on_message: Callable[[bytes], None]) -> None:
+    executor = _events_executor(node, on_message)
+    while not STOP.is_set():
+        executor.spin_until_future_complete(Future(), timeout_sec=0.25)
+
+
+NODES = {node.__name__: node for node in (bare, plain, floor, dds, receive, send, decode)}
 
 
 def main() -> None:
     """Run the node that the first argument names until SIGTERM."""
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    rclpy.init(args=sys.argv, signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
+    signal.signal(signal.SIGTERM, lambda number, frame: STOP.set())
+    rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
     NODES[sys.argv[1]](Node('foot_pose_publisher'))
+    rclpy.shutdown()  # a node that does not say goodbye slows the discovery of the next one down
 
 
 if __name__ == '__main__':
