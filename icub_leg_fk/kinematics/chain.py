@@ -126,7 +126,7 @@ class Chain:
         """
         if type(q) is not list and type(q) is not tuple:
             q = self._joint_vectors(q, 1).tolist()
-        return self._solver.pose(q)
+        return self.solver.pose(q)
 
     def poses(self, Q: ArrayLike) -> Array:
         """Return the (N, 7) rows x, y, z [m], qx, qy, qz, qw of N joint vectors.
@@ -139,11 +139,11 @@ class Chain:
         Raises:
             JointVectorError: Q is not (N, n), or an entry is no finite number.
         """
-        return self._solver.poses(self._joint_vectors(Q, 2))
+        return self.solver.poses(self._joint_vectors(Q, 2))
 
     def poses_as_one_by_one(self, Q: ArrayLike) -> Array:
         """Return what `poses` does, each row bit-identical to `pose` of its joint vector."""
-        return self._solver.poses(self._joint_vectors(Q, 2), libm=True)
+        return self.solver.poses(self._joint_vectors(Q, 2), libm=True)
 
     def jacobian(self, q: ArrayLike) -> Array:
         """Return the geometric Jacobian of the tip, in the root frame.
@@ -183,7 +183,8 @@ class Chain:
         return np.asarray(self.virtual_link.transform(0.0) @ self.T_n_tip)
 
     @cached_property
-    def _solver(self) -> PoseSolver:
+    def solver(self) -> PoseSolver:
+        """What `pose` and `poses` ask; takes no other joint vectors than lists and tuples."""
         return PoseSolver(self.links, self.T_root_0, self._T_last_tip)
 
     def _joint_vectors(self, q: ArrayLike, ndim: int) -> Array:

@@ -10,11 +10,12 @@ from collections.abc import Sequence
 from functools import cache
 import math
 import reprlib
+from typing import cast
 
 from icub_leg_fk.errors import JointVectorError
 from icub_leg_fk.kinematics.link import DHLink
 from icub_leg_fk.kinematics.rotation import Array, canonical_quaternion
-from icub_leg_fk.kinematics.walk import walk_to_root
+from icub_leg_fk.kinematics.walk import Step, walk_to_root
 import numpy as np
 
 BLOCK = 4096  # rows worked on at once: a dozen such arrays stay in the L2 cache
@@ -37,6 +38,8 @@ class PoseSolver:
 
     def __init__(self, links: Sequence[DHLink], T_root_0: Array, T_n_tip: Array) -> None:
         self._steps, self._start, self._end = walk_to_root(links, T_root_0, T_n_tip)
+        # Plain tuples, in spite of their type, for those unpack faster.
+        self._rows = cast(tuple[Step, ...], tuple(tuple(step) for step in self._steps))
 
     def pose(self, q: Sequence[float]) -> Pose:
         """Return x, y, z [m] and qx, qy, qz, qw (norm 1, w >= 0) for one joint vector.
@@ -53,7 +56,7 @@ class PoseSolver:
         turned = 0.0
         cos, sin = math.cos, math.sin
         try:
-            for qi, (turn, offset, d, a, right, ca, sa, ch, sh) in zip(reversed(q), self._steps):
+            for qi, (turn, offset, d, a, right, ca, sa, ch, sh) in zip(reversed(q), self._rows):
                 if turn is None:
                     theta = qi + offset
                     turned += theta

@@ -35,8 +35,8 @@ class FootPosePublisher(Node):
         self._outputs = Outputs(self, self._connect,
                                 lambda chain: self._settled().note_no_velocity(chain))
         self._diagnostics = Diagnostics(self)
-        self.create_subscription(
-            JointState, 'joint_states', self._on_joint_state, qos_profile_sensor_data, raw=True,
+        self._joint_states = self.create_subscription(
+            JointState, 'joint_states', lambda data: None, qos_profile_sensor_data, raw=True,
             qos_overriding_options=OVERRIDABLE)
         self._configure(parameters.configuration)
 
@@ -47,6 +47,7 @@ class FootPosePublisher(Node):
             joint_input.take_over(self._stream.settle())
         self._outputs.configure(configuration)
         self._stream = JointStream(joint_input, lambda: self.get_clock().now().nanoseconds)
+        self._joint_states.callback = self._stream.feed
         self._diagnostics.watch(self._stream)
         self._connect()
         for note in configuration.notes:
@@ -65,6 +66,3 @@ class FootPosePublisher(Node):
     def _settled(self) -> JointInput:
         assert self._stream is not None
         return self._stream.settle()
-
-    def _on_joint_state(self, data: bytes) -> None:
-        self._stream.feed(data)  # type: ignore[union-attr]

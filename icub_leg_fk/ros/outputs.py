@@ -127,7 +127,7 @@ class Outputs:
     def _pose_step(self, chain: Chain, configuration: Configuration,
                    send: Callable[[bytes], None]) -> OnReady:
         encode = PoseStampedEncoder(configuration.frame_prefix + chain.root_frame).encode
-        pose = chain.pose
+        pose = chain.solver.pose
 
         def publish_pose(sec: int, nanosec: int, q: Sequence[float],
                          qdot: Sequence[float] | None) -> None:
