@@ -61,7 +61,6 @@ setup(
         'ros': ROS,
         'tools': TOOLS,
         'test': TEST + LINT,
-        'bench': ['matplotlib>=3.6', 'pin', 'roboticstoolbox-python', 'rosbags>=0.10'],
     },
     entry_points={
         'console_scripts': [
