@@ -144,7 +144,7 @@ class Traffic:
     def _values(self, n):
         return [self.rng.uniform(-0.4, 0.4) for _ in range(n)]
 
-    def next(self):
+    def next_message(self):
         """Return a message, well-formed if not always sensible."""
         rng = self.rng
         publisher = rng.choice(self.publishers)

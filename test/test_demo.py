@@ -10,18 +10,16 @@ import subprocess
 import sys
 import time
 
-import numpy as np
-import pytest
-
-pytest.importorskip('rclpy')
-pytest.importorskip('matplotlib')
-
 from icub_leg_fk.kinematics import Catalog
 from icub_leg_fk.tools.demo import conclude
 from icub_leg_fk.tools.demonstration.node import NodeError, NodeProcess
-from icub_leg_fk.tools.demonstration.replay import Answers, Replay
 from icub_leg_fk.tools.gait import walk
 from icub_leg_fk.tools.leg_fk import main
+import numpy as np
+import pytest
+
+pytest.importorskip('matplotlib')
+player = pytest.importorskip('icub_leg_fk.tools.demonstration.replay', reason='needs rclpy')
 
 DEMO = (sys.executable, '-m', 'icub_leg_fk.tools.leg_fk', 'demo')
 TIPS = ('left_foot', 'right_foot')
@@ -140,7 +138,7 @@ def test_poses_received_are_those_of_the_chains(version, foot_frame):
     """In the order of the messages, equal to the plain product of the DH matrices."""
     catalog = Catalog.load()
     gait = walk(catalog, version, seconds=0.5)
-    with Replay(gait, '/leg_fk_test', TIPS) as replay, \
+    with player.Replay(gait, '/leg_fk_test', TIPS) as replay, \
             NodeProcess('/leg_fk_test', {'version': version, 'foot_frame': foot_frame}) as node:
         replay.wait_for_node(node.check)
         replay.play(lambda elapsed: None, 0.1, node.check)
@@ -155,7 +153,7 @@ def test_poses_received_are_those_of_the_chains(version, foot_frame):
 
 def test_lost_poses_are_told_and_exit_1(capsys):
     recording = walk(Catalog.load(), 'v2_5', seconds=0.1)
-    answers = [Answers(tip, np.zeros((10, 7)), np.full(10, 1e-3)) for tip in TIPS]
+    answers = [player.Answers(tip, np.zeros((10, 7)), np.full(10, 1e-3)) for tip in TIPS]
     answers[1].latencies[3:5] = np.nan
     assert conclude(recording, answers, Path('demo.png')) == 1
     captured = capsys.readouterr()
@@ -166,7 +164,7 @@ def test_lost_poses_are_told_and_exit_1(capsys):
 
 def test_no_pose_at_all_is_told_and_exit_1(capsys):
     recording = walk(Catalog.load(), 'v2_5', seconds=0.1)
-    answers = [Answers(tip, np.full((10, 7), np.nan), np.full(10, np.nan)) for tip in TIPS]
+    answers = [player.Answers(tip, np.full((10, 7), np.nan), np.full(10, np.nan)) for tip in TIPS]
     assert conclude(recording, answers, Path('demo.png')) == 1
     captured = capsys.readouterr()
     assert re.search(r'lost +20\n', captured.out)

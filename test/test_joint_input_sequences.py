@@ -54,7 +54,7 @@ def test_any_sequence_gives_the_poses_that_the_rules_give(robots, monkeypatch):
         trial, traffic = Trial(chains, rng.choice(TIMEOUTS)), Traffic(rng, chains)
         malformed, checked = rng.choice((0.0, 0.01)), rng.choice((0.002, 0.02, 1.0))
         for _ in range(SEQUENCE):
-            message = traffic.next()
+            message = traffic.next_message()
             if rng.random() < malformed:
                 trial.send_malformed(message.cdr()[:rng.randrange(12)])
                 sent += 1

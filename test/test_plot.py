@@ -7,18 +7,16 @@ import subprocess
 import sys
 import zlib
 
-import numpy as np
-import pytest
-
-pytest.importorskip('matplotlib')
-
 from icub_leg_fk.kinematics import Catalog
-from icub_leg_fk.tools.drawing.over_time import gaps, violations
-from icub_leg_fk.tools.drawing.pictures import feet_figure
 from icub_leg_fk.tools.gait import walk
 from icub_leg_fk.tools.leg_fk import main
 from icub_leg_fk.tools.plot import chosen_chains, telling_instants
 from icub_leg_fk.tools.recording import ChainTrack
+import numpy as np
+import pytest
+
+over_time = pytest.importorskip('icub_leg_fk.tools.drawing.over_time', reason='needs matplotlib')
+pictures = pytest.importorskip('icub_leg_fk.tools.drawing.pictures', reason='needs matplotlib')
 
 JOINTS = [f'{side}_{joint}' for side in 'lr' for joint in (
     'hip_pitch', 'hip_roll', 'hip_yaw', 'knee', 'ankle_pitch', 'ankle_roll')]
@@ -31,7 +29,7 @@ def gait():
 
 @pytest.fixture
 def walking_csv(tmp_path, monkeypatch, gait):
-    """A CSV file with extra columns and its columns in another order, in the present directory."""
+    """Return a CSV file with extra columns and another order, in the present directory."""
     monkeypatch.chdir(tmp_path)
     rows = [f'{q[6]},{t:.3f},text,' + ','.join(map(repr, np.delete(q, 6).tolist()))
             for t, q in zip(gait.times, gait.positions, strict=True)]
@@ -108,7 +106,7 @@ def test_same_input_gives_the_same_file(walking_csv):
 
 
 def test_curves_are_the_poses_of_the_chains(tracks):
-    figure = feet_figure(tracks, [0.5, 1.0], 'walk', ['left_leg', 'right_leg'])
+    figure = pictures.feet_figure(tracks, [0.5, 1.0], 'walk', ['left_leg', 'right_leg'])
     height, forward, left = figure.axes[:3]
     for track, (z, x, y) in zip(tracks, zip(height.lines, forward.lines, left.lines)):
         T = np.array([track.chain.forward(q) for q in track.positions])
@@ -122,20 +120,20 @@ def test_range_violations_are_found_with_joint_limit_and_time(tracks):
     q = tracks[1].positions.copy()
     q[50:60, 3] = np.radians(1)  # knee -125 .. 0
     q[70, 4] = np.radians(-43)  # ankle pitch -42 .. 21
-    found = violations(ChainTrack(tracks[1].chain, tracks[1].times, q))
+    found = over_time.violations(ChainTrack(tracks[1].chain, tracks[1].times, q))
     assert [(v.joint, v.limit) for v in found] == [
         ('r_knee', '> 0°'), ('r_ankle_pitch', '< \N{MINUS SIGN}42°')]
     assert np.allclose(found[0].spans, [(0.5, 0.6)])
     assert np.allclose(found[1].spans, [(0.7, 0.71)])
-    assert violations(tracks[1]) == []
+    assert over_time.violations(tracks[1]) == []
 
 
 def test_gaps_break_the_curve(tracks):
     keep = np.r_[0:80, 120:200]
     cut = [ChainTrack(t.chain, t.times[keep], t.positions[keep]) for t in tracks]
-    assert np.allclose(gaps(cut[0]), [(0.79, 1.2)])
-    assert gaps(tracks[0]) == []
-    curve = feet_figure(cut, [0.5], 'walk', []).axes[0].lines[0]
+    assert np.allclose(over_time.gaps(cut[0]), [(0.79, 1.2)])
+    assert over_time.gaps(tracks[0]) == []
+    curve = pictures.feet_figure(cut, [0.5], 'walk', []).axes[0].lines[0]
     assert np.isnan(curve.get_ydata()).sum() == 1
     assert np.isnan(curve.get_ydata()[80])
 
@@ -145,7 +143,7 @@ def test_long_curves_are_thinned_without_losing_their_extremes(tracks):
     q = np.tile(tracks[0].positions, (500, 1))
     q[12_345, 3] = -2.0
     long = ChainTrack(chain, np.arange(len(q)) / 1000, q)
-    curve = feet_figure([long], [1.0], 'walk', []).axes[0].lines[0]
+    curve = pictures.feet_figure([long], [1.0], 'walk', []).axes[0].lines[0]
     assert len(curve.get_ydata()) < 7000
     assert curve.get_ydata().max() == long.poses[:, 2].max() == long.poses[12_345, 2]
     assert curve.get_ydata().min() == long.poses[:, 2].min()
@@ -385,11 +383,11 @@ def test_other_robots_have_plain_axes_and_a_scale_that_fits(tmp_path):
     (tmp_path / 'arm.yaml').write_text(ARM)
     chain = Catalog.load(tmp_path / 'arm.yaml').chain('arm', 'v1')
     track = ChainTrack(chain, np.arange(9.0), np.linspace((0, 0), (1, 2), 9))
-    figure = feet_figure([track], [0.0, 8.0], 'arm', [])
+    figure = pictures.feet_figure([track], [0.0, 8.0], 'arm', [])
     assert [panel.get_title() for panel in figure.axes[:3]] == [
         'z  [m]', 'x  [m]', 'y  [m]']
     assert np.allclose(figure.axes[1].lines[0].get_ydata(), 2 * np.cos(track.positions[:, 0]))
-    assert violations(track)[0].limit == '> 1.5 m'
+    assert over_time.violations(track)[0].limit == '> 1.5 m'
     texts = [text.get_text() for view in figure.axes[4:] for text in view.texts]
     assert '2' in texts  # on the ruler
     assert 'forward' not in texts

@@ -13,7 +13,7 @@ from typing import BinaryIO
 import zlib
 
 from icub_leg_fk.tools.bags import mcap_records as mcap
-from icub_leg_fk.tools.bags.codecs import decompress
+from icub_leg_fk.tools.bags.compression import decompress
 from icub_leg_fk.tools.bags.topics import Topic
 
 _BLOCK = 1 << 20

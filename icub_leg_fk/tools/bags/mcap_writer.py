@@ -14,7 +14,7 @@ import zlib
 
 from icub_leg_fk import __version__
 from icub_leg_fk.tools.bags import mcap_records as mcap
-from icub_leg_fk.tools.bags.codecs import compressor
+from icub_leg_fk.tools.bags.compression import compressor
 from icub_leg_fk.tools.bags.topics import Message, Topic
 
 _CHUNK_SIZE = 1 << 20

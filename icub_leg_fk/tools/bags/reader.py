@@ -10,7 +10,7 @@ import shutil
 from typing import NamedTuple
 
 from icub_leg_fk.errors import InputFileError
-from icub_leg_fk.tools.bags.codecs import decompress, decompress_file, ZSTD_MAGIC
+from icub_leg_fk.tools.bags.compression import decompress, decompress_file, ZSTD_MAGIC
 from icub_leg_fk.tools.bags.mcap_reader import McapFile
 from icub_leg_fk.tools.bags.metadata import OldMetadata, read_metadata
 from icub_leg_fk.tools.bags.sqlite_reader import SqliteFile, torn_bytes

@@ -155,7 +155,7 @@ def _write_in_colors(figure: Figure, x: float, words: Sequence[tuple[str, str]],
     from matplotlib.offsetbox import AnchoredOffsetbox, HPacker, TextArea
 
     parts: list[Artist] = [TextArea(text, textprops={'color': color, 'fontsize': size})
-             for text, color in words]
+                           for text, color in words]
     figure.add_artist(AnchoredOffsetbox(
         'center left', child=HPacker(children=parts, pad=0, sep=size), pad=0, frameon=False,
         bbox_to_anchor=(x, 0.905), bbox_transform=figure.transFigure, borderpad=0))
