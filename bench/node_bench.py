@@ -6,7 +6,7 @@ meets all of them; every ratio is of two stretches that followed one another.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from contextlib import closing, ExitStack
 from typing import NamedTuple
 
@@ -187,9 +187,10 @@ def _grow(report: Report, bench: Bench, nodes: dict[str, NodeProcess], panel: st
           joints: int, rate: float, effort: Effort) -> None:
     """Add a point to each node's curve, unless the node cannot keep up."""
     count = round(rate * effort.messages / _RATE / 2)
-    turns: dict[str, Sequence[Stretch]] = {
-        name: [bench.stretch(node, joints, rate, count) for _ in range(min(3, effort.rounds))]
-        for name, node in nodes.items()}
+    turns: Turns = {name: [] for name in nodes}
+    for _ in range(min(3, effort.rounds)):
+        for name, node in nodes.items():
+            turns[name].append(bench.stretch(node, joints, rate, count))
     for name, stretches in turns.items():
         if not any(stretch.lost or stretch.latencies[-1] > _BEHIND for stretch in stretches):
             report.grow(panel, name, x, figure([stretch.cpu for stretch in stretches]))

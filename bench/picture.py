@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 from bench.report import Report
@@ -24,11 +25,15 @@ def draw(report: Report, path: Path) -> None:
     import matplotlib
     matplotlib.use('Agg')
     from matplotlib import pyplot as plt
+    from matplotlib.ticker import LogLocator
     plt.rcParams.update({'font.size': 9, 'axes.spines.top': False, 'axes.spines.right': False})
     panels = [panel for panel in _PANELS if panel in report.growth]
-    fig, all_axes = plt.subplots(1, len(panels), figsize=(3.6 * len(panels), 3.3),
-                                 squeeze=False, layout='constrained')
-    for axes, panel in zip(all_axes[0], panels):
+    rows = math.ceil(len(panels) / 2)
+    fig, all_axes = plt.subplots(rows, 2, figsize=(8.4, 3.1 * rows), squeeze=False,
+                                 layout='constrained')
+    for unused in all_axes.flat[len(panels):]:
+        unused.set_axis_off()
+    for axes, panel in zip(all_axes.flat, panels):
         title, xlabel, ylabel, log = _PANELS[panel]
         axes.set_title(title, fontsize=9, loc='left')
         axes.set_xlabel(xlabel)
@@ -48,6 +53,11 @@ def draw(report: Report, path: Path) -> None:
             axes.set_yscale('log')
         else:
             axes.set_ylim(bottom=0)
+        for axis in (axes.xaxis, axes.yaxis):
+            if axis.get_scale() == 'log':
+                axis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+                axis.set_major_formatter('{x:g}')
+                axis.set_minor_formatter('')
         if panel == 'chains':
             axes.set_xticks([1, 2, 3])
         axes.grid(alpha=0.25, linewidth=0.6)
