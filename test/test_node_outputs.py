@@ -151,8 +151,13 @@ def test_skeletons_go_through_the_frames_of_each_leg():
             as node, Robot(node) as robot:
         inbox = []
         robot.node.create_subscription(MarkerArray, node.topic('skeleton'), inbox.append, 10)
-        robot.until(lambda: robot.send(SECOND, BOTH, Q) or len(inbox) >= 2, 'skeletons')
-        by_chain = {array.markers[0].ns: array.markers for array in inbox}
+        by_chain = {}
+
+        def both_skeletons():
+            robot.send(SECOND, BOTH, Q)
+            by_chain.update({array.markers[0].ns: array.markers for array in inbox})
+            return len(by_chain) >= 2
+        robot.until(both_skeletons, 'skeletons')
         assert set(by_chain) == {'left_leg', 'right_leg'}
         for chain, part in CHAINS.values():
             frames = Catalog.load().chain(chain, 'v2_5', 'sole').frames(Q[part])
@@ -196,8 +201,14 @@ def test_transforms_are_those_of_the_poses(foot_frame, children):
     with NodeProcess(parameters) as node, Robot(node) as robot:
         inbox = []
         robot.node.create_subscription(TFMessage, '/tf', inbox.append, 10)
-        robot.until(lambda: robot.send(SECOND, BOTH, Q) or len(inbox) >= 2, 'transforms')
-        found = {message.transforms[0].child_frame_id: message.transforms[0] for message in inbox}
+        found = {}
+
+        def both_transforms():
+            robot.send(SECOND, BOTH, Q)
+            found.update({message.transforms[0].child_frame_id: message.transforms[0]
+                          for message in inbox})
+            return len(found) >= 2
+        robot.until(both_transforms, 'transforms')
         for child, (chain, part) in zip(children, CHAINS.values(), strict=True):
             transform = found[f'x/{child}']
             assert transform.header.frame_id == 'x/root_link'

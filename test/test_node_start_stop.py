@@ -61,7 +61,7 @@ def run(arguments):
     return subprocess.run(
         [sys.executable, '-m', 'icub_leg_fk.ros.main', '--ros-args',
          *shlex.split(arguments)],
-        capture_output=True, text=True, timeout=60, check=False)
+        capture_output=True, text=True, timeout=300, check=False)
 
 
 @pytest.fixture(scope='module')
