@@ -1,6 +1,7 @@
 """Settings of every test run: ROS 2 stays on this machine, in a domain of the run's own."""
 
 import os
+import signal
 import socket
 
 from hypothesis import settings
@@ -29,6 +30,10 @@ domain_id, _claim = claim_domain()
 os.environ['ROS_DOMAIN_ID'] = str(domain_id)
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
+
+# A run in the background may have been told to ignore these, and every child process with it.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 # How long an example takes says nothing on a busy machine.
 settings.register_profile('icub_leg_fk', deadline=None)
