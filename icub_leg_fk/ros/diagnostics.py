@@ -60,8 +60,8 @@ class Diagnostics:
             self._poses[chain.name] += counts.ready
             held_back = self._held_back.setdefault(chain.name, Counter())
             held_back.update(counts.held_back)
-            missing = [name for name in chain.joint_names
-                       if name not in joint_input.known_joints(index)]
+            known = joint_input.known_joints(index)
+            missing = [name for name in chain.joint_names if name not in known]
             level, message = _verdict(messages, rejected, counts, missing)
             values = {
                 'version': chain.version,

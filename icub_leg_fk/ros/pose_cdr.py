@@ -1,4 +1,4 @@
-"""geometry_msgs/PoseStamped to its CDR bytes, little-endian."""
+"""geometry_msgs/PoseStamped to its CDR bytes, little-endian, and what such encoders share."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import struct
 
 from icub_leg_fk.kinematics.solver import Pose
 
-_ENCAPSULATION = b'\x00\x01\x00\x00'
+ENCAPSULATION = b'\x00\x01\x00\x00'
+STAMP_SIZE = 8
 
 
 class PoseStampedEncoder:
@@ -17,9 +18,7 @@ class PoseStampedEncoder:
     """
 
     def __init__(self, frame_id: str) -> None:
-        text = frame_id.encode() + b'\x00'
-        padding = -(8 + 4 + len(text)) % 8  # stamp, length, text; then doubles, aligned to 8
-        self._frame_id = struct.pack('<I', len(text)) + text + bytes(padding)
+        self._frame_id = aligned(STAMP_SIZE, string(frame_id))
         self._pack = struct.Struct(f'<4siI{len(self._frame_id)}s7d').pack
 
     def encode(self, sec: int, nanosec: int, pose: Pose) -> bytes:
@@ -30,4 +29,15 @@ class PoseStampedEncoder:
             nanosec: nanoseconds of the stamp.
             pose: x, y, z [m], qx, qy, qz, qw.
         """
-        return self._pack(_ENCAPSULATION, sec, nanosec, self._frame_id, *pose)
+        return self._pack(ENCAPSULATION, sec, nanosec, self._frame_id, *pose)
+
+
+def string(text: str) -> bytes:
+    """Return the bytes of a string: length, text and NUL."""
+    data = text.encode() + b'\x00'
+    return struct.pack('<I', len(data)) + data
+
+
+def aligned(before: int, data: bytes) -> bytes:
+    """Return data, which so many bytes stand before, padded so that doubles can follow."""
+    return data + bytes(-(before + len(data)) % 8)

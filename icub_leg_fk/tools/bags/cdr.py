@@ -6,8 +6,7 @@ from collections.abc import Sequence
 import struct
 
 from icub_leg_fk.kinematics.solver import Pose
-
-_ENCAPSULATION = b'\x00\x01\x00\x00'
+from icub_leg_fk.ros.pose_cdr import aligned, ENCAPSULATION, STAMP_SIZE, string
 
 
 class TwistStampedEncoder:
@@ -18,7 +17,7 @@ class TwistStampedEncoder:
     """
 
     def __init__(self, frame_id: str) -> None:
-        self._frame_id = _aligned(8, _string(frame_id))
+        self._frame_id = aligned(STAMP_SIZE, string(frame_id))
         self._pack = struct.Struct(f'<4siI{len(self._frame_id)}s6d').pack
 
     def encode(self, sec: int, nanosec: int, twist: Sequence[float]) -> bytes:
@@ -29,7 +28,7 @@ class TwistStampedEncoder:
             nanosec: nanoseconds of the stamp.
             twist: linear x, y, z [m/s] and angular x, y, z [rad/s].
         """
-        return self._pack(_ENCAPSULATION, sec, nanosec, self._frame_id, *twist)
+        return self._pack(ENCAPSULATION, sec, nanosec, self._frame_id, *twist)
 
 
 class TransformEncoder:
@@ -41,9 +40,9 @@ class TransformEncoder:
     """
 
     def __init__(self, frame_id: str, child_frame_id: str) -> None:
-        names = _string(frame_id)
-        names += bytes(-len(names) % 4) + _string(child_frame_id)
-        self._names = _aligned(12, names)
+        names = string(frame_id)
+        names += bytes(-len(names) % 4) + string(child_frame_id)
+        self._names = aligned(12, names)
         self._pack = struct.Struct(f'<4sIiI{len(self._names)}s7d').pack
 
     def encode(self, sec: int, nanosec: int, pose: Pose) -> bytes:
@@ -54,14 +53,4 @@ class TransformEncoder:
             nanosec: nanoseconds of the stamp.
             pose: x, y, z [m], qx, qy, qz, qw.
         """
-        return self._pack(_ENCAPSULATION, 1, sec, nanosec, self._names, *pose)
-
-
-def _string(text: str) -> bytes:
-    data = text.encode() + b'\x00'
-    return struct.pack('<I', len(data)) + data
-
-
-def _aligned(before: int, data: bytes) -> bytes:
-    """Pad data that so many bytes stand before, so that doubles can follow."""
-    return data + bytes(-(before + len(data)) % 8)
+        return self._pack(ENCAPSULATION, 1, sec, nanosec, self._names, *pose)
