@@ -12,6 +12,8 @@ SETTINGS = setup.py pyproject.toml
 # A sourced ROS, or settings for one, must not mix with the ROS in .venv.
 unexport PYTHONPATH PYTHONHOME LD_LIBRARY_PATH AMENT_PREFIX_PATH RMW_IMPLEMENTATION
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
+# Compiled modules are kept, as in an installed package: without them every start takes longer.
+unexport PYTHONDONTWRITEBYTECODE
 export ROS_AUTOMATIC_DISCOVERY_RANGE = LOCALHOST
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 export PIP_USE_PEP517 = 1

@@ -34,7 +34,7 @@ def main() -> int:
     if 'node' in args.parts:
         from bench.node_bench import Effort, measure_node
         measure_node(report, Effort(1, 50, 1, False) if args.quick
-                     else Effort(7, 1000, 6, True))
+                     else Effort(7, 1000, 12, True))
     if 'kinematics' in args.parts:
         from bench.kinematics_bench import measure_kinematics
         measure_kinematics(report, seconds=0.1 if args.quick else 1.0)

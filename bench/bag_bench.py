@@ -21,6 +21,7 @@ _RATE = 1000  # Hz
 _START = 1_700_000_000 * 1_000_000_000  # ns
 _GAIT_MESSAGES = 100
 _LENGTHS = (10, 30, 60)  # s
+_JOBS_LENGTH = 180  # s
 _OURS = (sys.executable, '-m', 'icub_leg_fk.tools.leg_fk', 'bag')
 _PLAIN = (sys.executable, '-m', 'bench.plain_bag')
 
@@ -32,7 +33,7 @@ class _Run(NamedTuple):
 
 def measure_bag(report: Report, quick: bool) -> None:
     """Add the rows of point 6, and time against length to the picture."""
-    lengths, rounds = ((1, 2), 1) if quick else (_LENGTHS, 3)
+    lengths, jobs_length, rounds = ((1, 2), 2, 1) if quick else (_LENGTHS, _JOBS_LENGTH, 3)
     ours: dict[int, list[_Run]] = {seconds: [] for seconds in lengths}
     plain: dict[int, list[_Run]] = {seconds: [] for seconds in lengths}
     with TemporaryDirectory(prefix='bench_bag_') as directory:
@@ -42,18 +43,31 @@ def measure_bag(report: Report, quick: bool) -> None:
             for seconds, bag in bags.items():
                 ours[seconds].append(_time([*_OURS, str(bag)], folder / 'out', one_core=True))
                 plain[seconds].append(_time([*_PLAIN, str(bag)], folder / 'out', one_core=True))
-        longest = bags[lengths[-1]]
-        twin = folder / 'twin'
-        shutil.copytree(longest, twin)
-        both = [*_OURS, str(longest), str(twin)]
-        jobs = {count: [_time([*both, '--jobs', str(count), '--out-dir'], folder / 'out')
-                        for _ in range(rounds)] for count in (1, 2)}
-    _report(report, ours, plain, jobs)
+        jobs = _time_jobs(folder, jobs_length, rounds)
+    _report_speed(report, ours, plain)
+    report.row(f'two bags of {jobs_length} s, --jobs 1 / --jobs 2', ratio(jobs[1], jobs[2]), 'x',
+               at_least=1.7)
+    _report_memory(report, ours)
+    for name, runs in (('ours', ours), ('plain', plain)):
+        for length, of_length in runs.items():
+            report.grow('bag', name, length, figure([run.seconds for run in of_length]))
 
 
-def _report(report: Report, ours: dict[int, list[_Run]], plain: dict[int, list[_Run]],
-            jobs: dict[int, list[_Run]]) -> None:
-    shortest, longest = min(ours), max(ours)
+def _time_jobs(folder: Path, seconds: int, rounds: int) -> dict[int, list[float]]:
+    """Return how long two bags take with one and with two jobs [s]."""
+    bag, twin = write_bag(folder / 'bag', seconds), folder / 'twin'
+    shutil.copytree(bag, twin)
+    taken: dict[int, list[float]] = {1: [], 2: []}
+    for _ in range(rounds):
+        for jobs, readings in taken.items():
+            readings.append(_time([*_OURS, str(bag), str(twin), '--jobs', str(jobs), '--out-dir'],
+                                  folder / 'out').seconds)
+    return taken
+
+
+def _report_speed(report: Report, ours: dict[int, list[_Run]],
+                  plain: dict[int, list[_Run]]) -> None:
+    longest = max(ours)
     messages = longest * _RATE
     seconds = {name: [run.seconds for run in runs[longest]]
                for name, runs in (('ours', ours), ('plain', plain))}
@@ -66,15 +80,12 @@ def _report(report: Report, ours: dict[int, list[_Run]], plain: dict[int, list[_
     report.row('plain / leg_fk bag', ratio(seconds['plain'], seconds['ours']), 'x', at_least=8.0)
     report.row('times real time', figure([longest / s for s in seconds['ours']]), 'x',
                at_least=60.0)
-    report.row('two bags, --jobs 1 / --jobs 2', ratio([run.seconds for run in jobs[1]],
-                                                      [run.seconds for run in jobs[2]]), 'x',
-               at_least=1.7)
+
+
+def _report_memory(report: Report, ours: dict[int, list[_Run]]) -> None:
     report.section('7. memory of leg_fk bag: peak resident size')
-    for length in (shortest, longest):
+    for length in (min(ours), max(ours)):
         report.row(f'{length} s', figure([run.peak for run in ours[length]]), 'MB', at_most=200.0)
-    for name, runs in (('ours', ours), ('plain', plain)):
-        for length, of_length in runs.items():
-            report.grow('bag', name, length, figure([run.seconds for run in of_length]))
 
 
 def write_bag(path: Path, seconds: int) -> Path:
