@@ -148,7 +148,7 @@ class JointModel:
                         self.blamed[index].add(('out_of_range', joint))
                 speeds = tuple(self.held[joint].velocity for joint in chain)
                 ready.append((index, tuple(self.held[joint].position for joint in chain),
-                              speeds if all(map(math.isfinite, speeds)) else None))
+                              speeds if all(-LARGEST < v < LARGEST for v in speeds) else None))
         return ready
 
     def has_stepped_back(self, stamp, brought):

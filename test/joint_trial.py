@@ -1,4 +1,4 @@
-"""Messages through the model, the plain input and both kinds of stream, which must agree."""
+"""Messages through the model, the plain input and streams with and without velocities."""
 
 from collections import Counter
 import math
@@ -21,7 +21,7 @@ def bits(values):
 
 
 class Trial:
-    """A model, a plain input, a stream that takes the fast way where it can and one that cannot.
+    """A model, a plain input, and two streams, of which one is asked for velocities too.
 
     Every message goes to all four, and what comes out is compared after each.
     """
@@ -38,9 +38,9 @@ class Trial:
                   for reports in self.reports]
         self.plain = inputs[0]
         self.fast = JointStream(inputs[1], lambda: self.now)
-        self.slow = JointStream(inputs[2], lambda: self.now, velocities=True)
+        self.moving = JointStream(inputs[2], lambda: self.now, velocities=True)
         self.out = [], []
-        for stream, out in zip((self.fast, self.slow), self.out, strict=True):
+        for stream, out in zip((self.fast, self.moving), self.out, strict=True):
             stream.on_ready = [self._handler(index, out) for index in range(len(chains))]
         self.reported = Counter()
 
@@ -60,7 +60,7 @@ class Trial:
                 for vector in self.plain.update(*arguments)] == expected, message
         data = message.cdr()
         self.fast.feed(data)
-        self.slow.feed(data)
+        self.moving.feed(data)
         assert self.out[0] == [(index, sec, nanosec, q, None) for index, q, _ in expected], message
         assert self.out[1] == [(index, sec, nanosec, q, v) for index, q, v in expected], message
         self._check_reports(message)
@@ -74,13 +74,13 @@ class Trial:
         except MalformedMessageError as error:
             self.plain.reject_malformed(error)
         self.fast.feed(data)
-        self.slow.feed(data)
+        self.moving.feed(data)
         assert self.out == ([], []), data
         self._check_reports(data)
 
     def _check_reports(self, message):
-        plain, fast, slow = self.reports
-        assert plain == fast == slow, message
+        plain, fast, moving = self.reports
+        assert plain == fast == moving, message
         self.reported.update(reason for reason, _ in plain)
         for log in (*self.reports, *self.out):
             log.clear()
@@ -88,18 +88,18 @@ class Trial:
     def check_state(self):
         """Compare all that the inputs hold and have counted, then start counting anew."""
         model = self.model
-        fast, slow = self.fast.settle(), self.slow.settle()
+        fast, moving = self.fast.settle(), self.moving.settle()
         for index, chain in enumerate(model.chains):
             counts = self.plain.take_counts(index)
-            assert counts == fast.take_counts(index) == slow.take_counts(index)
+            assert counts == fast.take_counts(index) == moving.take_counts(index)
             assert counts.ready == model.ready[index]
             assert counts.held_back == model.held_back[index]
             assert {(reason, joint) for reason, joints in counts.joints.items()
                     for joint in joints} == model.blamed[index]
             known = {joint: model.held[joint].stamp for joint in chain if joint in model.held}
-            for joint_input in (self.plain, fast, slow):
+            for joint_input in (self.plain, fast, moving):
                 assert joint_input.known_joints(index) == known
-        for joint_input in (self.plain, fast, slow):
+        for joint_input in (self.plain, fast, moving):
             assert joint_input.messages == model.messages
             assert joint_input.counts == model.counts
             assert joint_input.newest == model.newest

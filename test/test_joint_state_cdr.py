@@ -76,8 +76,8 @@ def test_offsets_point_at_the_numbers(message):
     assert order == message.order
     assert data[decoded.positions_at:][:8 * count] == struct.pack(
         f'{order}{count}d', *message.positions)
-    for at, values in ((decoded.velocities_at, message.velocities),
-                       (decoded.efforts_at, message.efforts)):
+    for at, values in ((decoded.velocity_count_at, message.velocities),
+                       (decoded.effort_count_at, message.efforts)):
         assert struct.unpack_from(f'{order}I', data, at) == (len(values),)
 
 
@@ -189,9 +189,9 @@ def test_an_absurd_count_is_refused_without_allocating(order, count):
     message = Message(**{**vars(GOOD), 'order': order})
     data = message.cdr()
     decoded = decode_joint_state(data)
-    counts_at = {'header.frame_id': 12, 'name': 24, 'velocity': decoded.velocities_at,
+    counts_at = {'header.frame_id': 12, 'name': 24, 'velocity': decoded.velocity_count_at,
                  'position': data.rindex(struct.pack(order + 'I', 3), 0, decoded.positions_at),
-                 'effort': decoded.efforts_at}
+                 'effort': decoded.effort_count_at}
     for field, at in counts_at.items():
         spoilt = data[:at] + struct.pack(order + 'I', count) + data[at + 4:]
         tracemalloc.start()

@@ -86,7 +86,7 @@ def test_velocities_may_be_wanted_later_and_no_longer(chains, decoded):
         expected.append(tuple(held[name] for name in chains[POINTER].joint_names)
                         if wanted else None)
     assert velocities == expected
-    assert len(decoded) == 1 + 10 + 1
+    assert len(decoded) == 3
     assert stream.settle().messages == 30
     assert stream.settle().take_counts(POINTER).ready == 30
 
@@ -137,7 +137,7 @@ def test_equal_bytes_with_other_counts_behind_are_told_apart(trial):
         trial.send(replace(with_efforts, nanosec=step))
 
 
-@pytest.mark.parametrize('which', ['velocities_at', 'efforts_at'])
+@pytest.mark.parametrize('which', ['velocity_count_at', 'effort_count_at'])
 def test_an_absurd_count_behind_the_positions_is_refused_by_the_fast_way_too(trial, which):
     message = at(1020, velocities=(0.0,) * 4, efforts=(0.0,) * 4)
     warm(trial, velocities=(0.0,) * 4, efforts=(0.0,) * 4)

@@ -1,9 +1,9 @@
 """Properties of any chain: random tables, sliding joints, right angles and odd twists."""
 
-from collections.abc import Sequence
 from math import pi
 import tracemalloc
 
+from any_chain import chain_of, chains_and_positions
 from hypothesis import given
 from hypothesis import strategies as st
 from icub_leg_fk.errors import JointVectorError, LegFKError
@@ -11,45 +11,6 @@ from icub_leg_fk.kinematics import Catalog, Chain, DHLink, quaternion_to_matrix,
 import numpy as np
 from oracle import product
 import pytest
-
-LENGTHS = st.one_of(st.sampled_from([0.0, -0.0, 1.0]), st.floats(-2, 2))
-ANGLES = st.one_of(
-    st.sampled_from([0.0, pi / 2, -pi / 2, pi, -pi, 3 * pi / 2, 1e-9, -1e-300, pi / 2 + 1e-12,
-                     pi - 1e-12]),
-    st.floats(-4, 4))
-LINKS = st.builds(DHLink, a=LENGTHS, d=LENGTHS, alpha=ANGLES, offset=ANGLES,
-                  joint_type=st.sampled_from(['revolute', 'revolute', 'prismatic']))
-
-
-@st.composite
-def transforms(draw: st.DrawFn) -> np.ndarray:
-    quaternion = np.array([draw(ANGLES) for _ in range(4)])
-    length = np.linalg.norm(quaternion)
-    T = np.eye(4)
-    if length > 1e-3:
-        T[:3, :3] = quaternion_to_matrix(quaternion / length)
-    T[:3, 3] = [draw(LENGTHS) for _ in range(3)]
-    return T
-
-
-def chain_of(links: Sequence[DHLink], T_root_0: np.ndarray | None = None,
-             virtual_link: DHLink | None = None, T_n_tip: np.ndarray | None = None) -> Chain:
-    return Chain(
-        name='any', version='', root_frame='root', tip='tip', tip_frame='tip',
-        joint_names=tuple(f'joint_{i}' for i in range(len(links))), links=tuple(links),
-        T_root_0=np.eye(4) if T_root_0 is None else T_root_0, virtual_link=virtual_link,
-        T_n_tip=np.eye(4) if T_n_tip is None else T_n_tip)
-
-
-CHAINS = st.builds(chain_of, st.lists(LINKS, min_size=1, max_size=7), transforms(),
-                   st.one_of(st.none(), LINKS), transforms())
-
-
-@st.composite
-def chains_and_positions(draw: st.DrawFn) -> tuple[Chain, list[list[float]]]:
-    chain = draw(CHAINS)
-    n = len(chain.links)
-    return chain, draw(st.lists(st.lists(ANGLES, min_size=n, max_size=n), min_size=1, max_size=3))
 
 
 @given(chains_and_positions())

@@ -16,6 +16,7 @@ from icub_leg_fk.kinematics.rotation import (
     quaternion_to_matrix,
 )
 from icub_leg_fk.kinematics.solver import Pose, PoseSolver
+from icub_leg_fk.kinematics.twist_solver import Twist, TwistSolver
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -169,6 +170,18 @@ class Chain:
         angular = np.where(prismatic, 0.0, axes)
         return np.hstack((linear, angular)).T
 
+    def twist(self, q: Sequence[float], qdot: Sequence[float]) -> Twist:
+        """Return the tip's vx, vy, vz [m/s] and wx, wy, wz [rad/s] in the axes of the root frame.
+
+        Args:
+            q: n joint positions [rad or m]; a list or tuple of floats.
+            qdot: n joint velocities [rad/s or m/s]; likewise.
+
+        Raises:
+            JointVectorError: q or qdot has not n entries, or one is no finite number.
+        """
+        return self.twist_solver.twist(q, qdot)
+
     def out_of_range(self, q: Sequence[float]) -> tuple[str, ...]:
         """Return the names of the joints whose position is outside its documented range."""
         return tuple(
@@ -186,6 +199,11 @@ class Chain:
     def solver(self) -> PoseSolver:
         """What `pose` and `poses` ask; takes no other joint vectors than lists and tuples."""
         return PoseSolver(self.links, self.T_root_0, self._T_last_tip)
+
+    @cached_property
+    def twist_solver(self) -> TwistSolver:
+        """What `twist` asks, and what computes many twists."""
+        return TwistSolver(self.links, self.T_root_0, self._T_last_tip)
 
     def _joint_vectors(self, q: ArrayLike, ndim: int) -> Array:
         n = len(self.links)

@@ -135,7 +135,7 @@ class PoseSolver:
             if step.turn is None:
                 theta = qi + step.offset
                 turned = turned + theta
-                c, s = _cos_sin_many(theta, libm)
+                c, s = cos_sin_many(theta, libm)
             else:
                 c, s = step.turn
                 z = z + qi
@@ -153,7 +153,7 @@ class PoseSolver:
             else:
                 qw, qx = qw + qx, qx - qw
                 qy, qz = qy + qz, qz - qy
-        c, s = _cos_sin_many(np.full(Q.shape[1], 0.5) * turned, libm)
+        c, s = cos_sin_many(np.full(Q.shape[1], 0.5) * turned, libm)
         qw, qz = _rotate(c, s, qw, qz)
         qx, qy = c * qx + s * qy, c * qy - s * qx
         c, s, tx, ty, tz = self._end
@@ -181,7 +181,8 @@ class PoseSolver:
         return JointVectorError(f'joint vector: found {where}, allowed: finite numbers')
 
 
-def _cos_sin_many(theta: Array, libm: bool) -> tuple[Array, Array]:
+def cos_sin_many(theta: Array, libm: bool = True) -> tuple[Array, Array]:
+    """Return cosines and sines, from the C library unless told otherwise."""
     if not libm:
         # numpy vectorises its tangent, but not its cosine and sine, which follow the C library.
         t = np.tan(0.5 * theta)

@@ -3,7 +3,7 @@
 - Joints are matched by name; joints of no chain are ignored.
 - A message that brings some of a chain's joints updates those. The chain is then ready if each of
   its joints is known, finite and no older than `joint_timeout` beside the newest of them.
-  (Finite is what leaves room to compute with: less than `LARGEST_POSITION`.)
+  (Finite is what leaves room to compute with: less than `LARGEST_VALUE`.)
 - A message is rejected as a whole if `position` is shorter than `name` or a name stands twice; an
   empty `position` is counted only.
 - Time has stepped back if a message is older than what is held of a joint it brings, or older by
@@ -19,28 +19,13 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 import math
-from typing import NamedTuple
 
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.ros.joint_names import JointNames, ResolvedNames
+from icub_leg_fk.ros.joint_vector import are_usable, JointVector, LARGEST_VALUE
 
 MESSAGE_REASONS = ('malformed', 'empty_position', 'short_position', 'duplicate_name', 'time_jump')
 CHAIN_REASONS = ('missing_joint', 'non_finite', 'stale_joint', 'no_velocity')
-LARGEST_POSITION = 1e150  # beyond it sums and products of positions overflow
-
-
-class JointVector(NamedTuple):
-    """A chain's joint vector, complete and fresh.
-
-    Attributes:
-        chain: index of the chain.
-        positions: n joint positions [rad or m].
-        velocities: n joint velocities [rad/s or m/s], or None if one is unknown or not finite.
-    """
-
-    chain: int
-    positions: tuple[float, ...]
-    velocities: tuple[float, ...] | None
 
 
 @dataclass
@@ -129,13 +114,14 @@ class JointInput:
         return [vector for vector in ready if vector is not None]
 
     def hold(self, stamp_ns: int, names: tuple[str, ...], positions: Sequence[float],
-             repeats: int, ready: Sequence[int]) -> None:
+             velocities: Sequence[float], repeats: int, ready: Sequence[int]) -> None:
         """Take in the last of some messages that a faster path has found good and given out.
 
         Args:
             stamp_ns: stamp of the last message [ns].
             names: joint names.
             positions: positions of the last message [rad or m].
+            velocities: velocities of the last message [rad/s or m/s]; empty if unknown.
             repeats: how many such messages there were.
             ready: the chains that each of them made ready.
         """
@@ -147,7 +133,7 @@ class JointInput:
         for index, slot in self._names.resolve(names).pairs:
             self._stamps[slot] = stamp_ns
             self._positions[slot] = positions[index]
-            self._velocities[slot] = math.nan
+            self._velocities[slot] = velocities[index] if velocities else math.nan
 
     def reject_malformed(self, error: Exception) -> None:
         """Count a message that could not even be decoded."""
@@ -217,7 +203,7 @@ class JointInput:
             elif stamp < oldest_allowed:
                 age = (max(known) - stamp) / 1e9
                 found.setdefault('stale_joint', {})[name] = f'{age:.3f} s old'
-            elif not abs(position) < LARGEST_POSITION:
+            elif not abs(position) < LARGEST_VALUE:
                 found.setdefault('non_finite', {})[name] = str(position)
         if found:
             for reason, joints in found.items():
@@ -230,7 +216,7 @@ class JointInput:
         self.note_range(index, positions)
         velocities = tuple([self._velocities[slot] for slot in slots])
         return JointVector(index, positions,
-                           velocities if all(map(math.isfinite, velocities)) else None)
+                           velocities if are_usable(velocities) else None)
 
     def note_range(self, index: int, positions: Sequence[float]) -> None:
         """Note the joints that are outside their documented range; the pose goes out anyway."""

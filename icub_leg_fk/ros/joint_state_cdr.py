@@ -32,8 +32,9 @@ class JointStateMessage(NamedTuple):
         velocities: velocities [rad/s or m/s].
         byte_order: `<` or `>`.
         positions_at: offset of the first position.
-        velocities_at: offset of the count of velocities.
-        efforts_at: offset of the count of efforts.
+        velocity_count_at: offset of the count of velocities.
+        velocities_at: offset of the first velocity.
+        effort_count_at: offset of the count of efforts.
         efforts: number of efforts.
         padding: offset and size of what is skipped for alignment.
     """
@@ -45,8 +46,9 @@ class JointStateMessage(NamedTuple):
     velocities: tuple[float, ...]
     byte_order: str
     positions_at: int
+    velocity_count_at: int
     velocities_at: int
-    efforts_at: int
+    effort_count_at: int
     efforts: int
     padding: tuple[tuple[int, int], ...]
 
@@ -68,13 +70,13 @@ def decode_joint_state(data: bytes) -> JointStateMessage:
     # A string takes at least its length field, so the count cannot exceed a quarter of the rest.
     names = tuple([reader.string('name') for _ in range(reader.count('name', 4))])
     positions_at, positions = reader.doubles('position')
-    velocities_at = reader.align(4)
-    _, velocities = reader.doubles('velocity')
-    efforts_at = reader.align(4)
+    velocity_count_at = reader.align(4)
+    velocities_at, velocities = reader.doubles('velocity')
+    effort_count_at = reader.align(4)
     _, efforts = reader.doubles('effort')
     return JointStateMessage(sec, nanosec, names, positions, velocities, byte_order,
-                             positions_at, velocities_at, efforts_at, len(efforts),
-                             tuple(reader.padding))
+                             positions_at, velocity_count_at, velocities_at, effort_count_at,
+                             len(efforts), tuple(reader.padding))
 
 
 class _Reader:

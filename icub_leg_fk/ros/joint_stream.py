@@ -4,9 +4,9 @@ A robot sends the same names in the same order a thousand times a second. The fi
 kind is decoded in full and its layout remembered: the bytes from frame_id to the first position,
 and where its numbers lie. A message that repeats these bytes is unpacked in one go; the padding
 among them may differ, for publishers leave in it whatever their buffer held before. Whenever
-anything is out of the ordinary (another layout, time not moving on, a value that is no finite
-number, a chain brought in parts) the message goes the plain way through `decode_joint_state` and
-`JointInput.update`, which stay the only place where the rules are decided.
+anything is out of the ordinary (another layout, time not moving on, a number that cannot be
+computed with, a chain brought in parts) the message goes the plain way, through
+`decode_joint_state` and `JointInput.update`, which alone decide the rules.
 """
 
 from __future__ import annotations
@@ -19,12 +19,13 @@ from typing import Any
 
 from icub_leg_fk.errors import MalformedMessageError
 from icub_leg_fk.kinematics import Chain
-from icub_leg_fk.ros.joint_input import JointInput, LARGEST_POSITION
+from icub_leg_fk.ros.joint_input import JointInput
 from icub_leg_fk.ros.joint_state_cdr import decode_joint_state, JointStateMessage, STAMP_END
+from icub_leg_fk.ros.joint_vector import are_usable, LARGEST_VALUE
 
 _REMEMBERED_LAYOUTS = 8
 _LARGEST_REMEMBERED = 65536  # bytes of a message; what a stranger sends may be larger
-_LARGEST = math.nextafter(LARGEST_POSITION, 0.0)
+_LARGEST = math.nextafter(LARGEST_VALUE, 0.0)
 _FIRST = 3  # fields before the joints: encapsulation, sec, nanosec
 
 Fields = tuple[Any, ...]
@@ -35,21 +36,28 @@ OnReady = Callable[[int, int, Sequence[float], Sequence[float] | None], None]
 class _Layout:
     """The shape of a message that brings some chains whole and touches no other."""
 
-    def __init__(self, data: bytes, message: JointStateMessage, chains: Sequence[Chain]) -> None:
+    def __init__(self, data: bytes, message: JointStateMessage, chains: Sequence[Chain],
+                 velocities: bool) -> None:
         wanted = {name for chain in chains for name in chain.joint_names}
-        joints = [(name, index) for index, name in enumerate(message.names) if name in wanted]
-        place = {name: i for i, (name, _) in enumerate(joints)}
-        self.names = tuple(place)
+        joints = {name: index for index, name in enumerate(message.names) if name in wanted}
+        places = {name: _FIRST + i for i, name in enumerate(joints)}
+        moving = velocities and len(message.velocities) >= len(message.names)
+        self.names = tuple(joints)
+        self.positions = slice(_FIRST, _FIRST + len(joints))
+        self.velocities = slice(self.positions.stop + 1, -1) if moving else None
         self.chains = tuple(
-            (index, _picker([_FIRST + place[name] for name in chain.joint_names]))
-            for index, chain in enumerate(chains) if place.keys() >= set(chain.joint_names))
+            (index, _picker([places[name] for name in chain.joint_names]),
+             _picker([places[name] + len(joints) + 1 for name in chain.joint_names])
+             if moving else None)
+            for index, chain in enumerate(chains) if joints.keys() >= set(chain.joint_names))
         self.bounds = tuple(_bounds(name, chains) for name in self.names)
         self.size = len(data)
         self.head = data[STAMP_END:message.positions_at]
         self._mask = int.from_bytes(_head_mask(message), 'little')
         self._masked_head = int.from_bytes(self.head, 'little') & self._mask
+        self.pick_fixed = itemgetter(0, self.positions.stop, -1)
         self.fixed = (data[:4], len(message.velocities), message.efforts)
-        self.unpack = _struct(data, message, [index for _, index in joints]).unpack
+        self.unpack = _struct(data, message, tuple(joints.values()), moving).unpack
         self.repeats = 0
         self.last: tuple[int, int, Fields] | None = None
 
@@ -71,10 +79,13 @@ def _head_mask(message: JointStateMessage) -> bytes:
     return bytes(mask[STAMP_END:])
 
 
-def _struct(data: bytes, message: JointStateMessage, indices: list[int]) -> struct.Struct:
-    """Return what unpacks encapsulation, stamp, some positions and the two counts behind them."""
+def _struct(data: bytes, message: JointStateMessage, indices: Sequence[int],
+            moving: bool) -> struct.Struct:
+    """Return what unpacks encapsulation, stamp, positions, a count, velocities and a count."""
     items = [(message.positions_at + 8 * index, 'd', 8) for index in indices]
-    items += [(message.velocities_at, 'I', 4), (message.efforts_at, 'I', 4)]
+    items += [(message.velocity_count_at, 'I', 4)]
+    items += [(message.velocities_at + 8 * index, 'd', 8) for index in indices if moving]
+    items += [(message.effort_count_at, 'I', 4)]
     fmt, at = f'{message.byte_order}4siI', STAMP_END
     for offset, code, size in items:
         fmt += f'{offset - at}x{code}'
@@ -104,7 +115,7 @@ class JointStream:
     Args:
         joint_input: the rules and what they hold.
         now: returns the present time [ns], for messages with a zero stamp.
-        velocities: whether velocities are wanted; then every message goes the plain way.
+        velocities: whether velocities are wanted.
 
     Attributes:
         on_ready: one function or None per chain; None where nobody wants its joint vectors.
@@ -115,7 +126,7 @@ class JointStream:
         self.on_ready: list[OnReady | None] = [None] * len(joint_input.chains)
         self._input = joint_input
         self._now = now
-        self._plain_only = velocities
+        self._velocities = velocities
         self._layouts: list[_Layout] = []
         self._layout: _Layout | None = None
         self._newest: int | None = None
@@ -123,11 +134,11 @@ class JointStream:
 
     def want_velocities(self, wanted: bool) -> None:
         """Change whether velocities are wanted, from the next message on."""
-        if wanted:
+        if wanted != self._velocities:
             self.settle()
             self._layouts.clear()
             self._layout = None
-        self._plain_only = wanted
+            self._velocities = wanted
 
     def feed(self, data: bytes) -> None:
         """Take one serialized JointState in."""
@@ -144,35 +155,38 @@ class JointStream:
         stamp = sec * 1_000_000_000 + nanosec
         newest = self._newest
         if (newest is None or stamp < newest or stamp == 0
-                or (fields[0], fields[-2], fields[-1]) != layout.fixed):
+                or layout.pick_fixed(fields) != layout.fixed):
+            self._feed_plain(data)
+            return
+        if layout.velocities is not None and not are_usable(fields[layout.velocities]):
             self._feed_plain(data)
             return
         for position, (lower, upper) in zip(fields[_FIRST:], layout.bounds):
             if not lower <= position <= upper:
-                usable = [abs(value) <= _LARGEST for value in fields[_FIRST:-2]]
-                if not all(usable):
+                if not are_usable(fields[layout.positions]):
                     self._feed_plain(data)
                     return
-                for index, pick in layout.chains:
+                for index, pick, _ in layout.chains:
                     self._input.note_range(index, pick(fields))
                 break
         self._fed += 1
         layout.repeats += 1
         layout.last = (self._fed, stamp, fields)
         on_ready = self.on_ready
-        for index, pick in layout.chains:
+        for index, pick, pick_velocities in layout.chains:
             self._newest = stamp
             handler = on_ready[index]
             if handler is not None:
-                handler(sec, nanosec, pick(fields), None)
+                handler(sec, nanosec, pick(fields), pick_velocities and pick_velocities(fields))
 
     def settle(self) -> JointInput:
         """Return the rules' state with everything in it that came the fast way."""
         pending = [layout for layout in self._layouts if layout.last is not None]
         for layout in sorted(pending, key=_last_fed):
             _, stamp, fields = layout.last or (0, 0, ())
-            self._input.hold(stamp, layout.names, fields[_FIRST:-2], layout.repeats,
-                             [index for index, _ in layout.chains])
+            velocities = fields[layout.velocities] if layout.velocities else ()
+            self._input.hold(stamp, layout.names, fields[layout.positions], velocities,
+                             layout.repeats, [index for index, _, _ in layout.chains])
             layout.repeats, layout.last = 0, None
         return self._input
 
@@ -196,12 +210,12 @@ class JointStream:
         vectors = joint_input.update(sec * 1_000_000_000 + nanosec, message.names,
                                      message.positions, message.velocities)
         self._newest = joint_input.newest
-        if not self._plain_only and self._known_layout(data) is None:
+        if self._known_layout(data) is None:
             self._remember(data, message)
         for vector in vectors:
             handler = self.on_ready[vector.chain]
             if handler is not None:
-                velocities = vector.velocities if self._plain_only else None
+                velocities = vector.velocities if self._velocities else None
                 handler(sec, nanosec, vector.positions, velocities)
 
     def _remember(self, data: bytes, message: JointStateMessage) -> None:
@@ -216,7 +230,7 @@ class JointStream:
                 return
         if len(self._layouts) >= _REMEMBERED_LAYOUTS:
             self._layouts.clear()
-        self._layout = _Layout(data, message, self._input.chains)
+        self._layout = _Layout(data, message, self._input.chains, self._velocities)
         self._layouts.append(self._layout)
 
 

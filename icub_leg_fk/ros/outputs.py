@@ -16,7 +16,7 @@ from icub_leg_fk.ros.configuration import Configuration
 from icub_leg_fk.ros.joint_stream import OnReady
 from icub_leg_fk.ros.pose_cdr import PoseStampedEncoder
 from icub_leg_fk.ros.qos_overrides import OVERRIDABLE
-from icub_leg_fk.ros.twist import tip_twist
+from icub_leg_fk.ros.twist_cdr import TwistStampedEncoder
 from rclpy.event_handler import PublisherEventCallbacks, UnsupportedEventTypeError
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -105,7 +105,7 @@ class Outputs:
             steps.append(self._pose_step(chain, configuration, _sender(self._publishers[topic])))
         if self._wanted(topic := f'~/{chain.tip}/twist'):
             steps.append(self._twist_step(index, chain, configuration,
-                                          self._publishers[topic].publish))
+                                          _sender(self._publishers[topic])))
         if configuration.publish_tf:
             steps.append(self._tf_step(chain, configuration))
         if self._wanted('~/skeleton'):
@@ -135,21 +135,16 @@ class Outputs:
         return publish_pose
 
     def _twist_step(self, index: int, chain: Chain, configuration: Configuration,
-                    publish: Callable[[TwistStamped], None]) -> OnReady:
-        frame_id = configuration.frame_prefix + chain.root_frame
+                    send: Callable[[bytes], None]) -> OnReady:
+        encode = TwistStampedEncoder(configuration.frame_prefix + chain.root_frame).encode
+        twist = chain.twist_solver.twist
 
         def publish_twist(sec: int, nanosec: int, q: Sequence[float],
                           qdot: Sequence[float] | None) -> None:
             if qdot is None:
                 self._no_velocity(index)
-                return
-            message = TwistStamped()
-            message.header.frame_id = frame_id
-            message.header.stamp = Time(sec=sec, nanosec=nanosec)
-            linear, angular = message.twist.linear, message.twist.angular
-            (linear.x, linear.y, linear.z,
-             angular.x, angular.y, angular.z) = tip_twist(chain, q, qdot)
-            publish(message)
+            else:
+                send(encode(sec, nanosec, twist(q, qdot)))
         return publish_twist
 
     def _tf_step(self, chain: Chain, configuration: Configuration) -> OnReady:

@@ -1,34 +1,11 @@
-"""geometry_msgs/TwistStamped and tf2_msgs/TFMessage to their CDR bytes, little-endian."""
+"""tf2_msgs/TFMessage to its CDR bytes, little-endian."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 import struct
 
 from icub_leg_fk.kinematics.solver import Pose
-from icub_leg_fk.ros.pose_cdr import aligned, ENCAPSULATION, STAMP_SIZE, string
-
-
-class TwistStampedEncoder:
-    """Serializes TwistStamped messages of one frame id.
-
-    Args:
-        frame_id: the frame in whose axes the twists are given.
-    """
-
-    def __init__(self, frame_id: str) -> None:
-        self._frame_id = aligned(STAMP_SIZE, string(frame_id))
-        self._pack = struct.Struct(f'<4siI{len(self._frame_id)}s6d').pack
-
-    def encode(self, sec: int, nanosec: int, twist: Sequence[float]) -> bytes:
-        """Return the bytes of one message.
-
-        Args:
-            sec: seconds of the stamp.
-            nanosec: nanoseconds of the stamp.
-            twist: linear x, y, z [m/s] and angular x, y, z [rad/s].
-        """
-        return self._pack(ENCAPSULATION, sec, nanosec, self._frame_id, *twist)
+from icub_leg_fk.ros.pose_cdr import aligned, ENCAPSULATION, string
 
 
 class TransformEncoder:

@@ -2,7 +2,8 @@
 
 Each JointState goes through `JointStream`, as in the node, and every pose lands right behind the
 message that gave it. The joint vectors of a block are collected and computed together, by
-`Chain.poses_as_one_by_one`, which gives to the bit what the node's `Chain.pose` gives.
+`Chain.poses_as_one_by_one` and `TwistSolver.twists`, which give to the bit what the node's
+`Chain.pose` and `Chain.twist` give.
 """
 
 from __future__ import annotations
@@ -16,9 +17,10 @@ from icub_leg_fk.ros.configuration import Configuration
 from icub_leg_fk.ros.joint_input import JointInput
 from icub_leg_fk.ros.joint_stream import JointStream, OnReady
 from icub_leg_fk.ros.pose_cdr import PoseStampedEncoder
-from icub_leg_fk.ros.twist import tip_twist
-from icub_leg_fk.tools.bags.cdr import TransformEncoder, TwistStampedEncoder
+from icub_leg_fk.ros.twist_cdr import TwistStampedEncoder
+from icub_leg_fk.tools.bags.cdr import TransformEncoder
 from icub_leg_fk.tools.bags.topics import Message, new_topic, POSE, TF, Topic, TWIST
+import numpy as np
 
 NODE = '/foot_pose_publisher'
 TF_TOPIC = '/tf'
@@ -153,11 +155,11 @@ class _ChainOutput:
         return missing
 
     def _fill_twists(self, ready: Sequence[_Ready], block: list[Message | None]) -> int:
-        missing = 0
-        for place, time, sec, nanosec, q, qdot in ready:
-            if qdot is None:
-                missing += 1
-            else:
-                block[place + 1] = (self._twist_topic, 0, time, time, self._encode_twist(
-                    sec, nanosec, tip_twist(self._chain, q, qdot)))
-        return missing
+        moving = [item for item in ready if item[5] is not None]
+        if moving:
+            twists = self._chain.twist_solver.twists(
+                np.array([item[4] for item in moving]), np.array([item[5] for item in moving]))
+            topic, encode = self._twist_topic, self._encode_twist
+            for (place, time, sec, nanosec, _, _), twist in zip(moving, twists.tolist()):
+                block[place + 1] = (topic, 0, time, time, encode(sec, nanosec, twist))
+        return len(ready) - len(moving)
