@@ -43,8 +43,11 @@ def measure_bag(report: Report, quick: bool) -> None:
             for seconds, bag in bags.items():
                 ours[seconds].append(_time([*_OURS, str(bag)], folder / 'out', one_core=True))
                 plain[seconds].append(_time([*_PLAIN, str(bag)], folder / 'out', one_core=True))
+        longest = str(bags[lengths[-1]])
+        twists = [_time([*_OURS, '--twist', longest], folder / 'out', one_core=True)
+                  for _ in range(rounds)]
         jobs = _time_jobs(folder, jobs_length, rounds)
-    _report_speed(report, ours, plain)
+    _report_speed(report, ours, plain, twists)
     report.row(f'two bags of {jobs_length} s, --jobs 1 / --jobs 2', ratio(jobs[1], jobs[2]), 'x',
                at_least=1.7)
     _report_memory(report, ours)
@@ -65,18 +68,18 @@ def _time_jobs(folder: Path, seconds: int, rounds: int) -> dict[int, list[float]
     return taken
 
 
-def _report_speed(report: Report, ours: dict[int, list[_Run]],
-                  plain: dict[int, list[_Run]]) -> None:
+def _report_speed(report: Report, ours: dict[int, list[_Run]], plain: dict[int, list[_Run]],
+                  twists: list[_Run]) -> None:
     longest = max(ours)
     messages = longest * _RATE
-    seconds = {name: [run.seconds for run in runs[longest]]
-               for name, runs in (('ours', ours), ('plain', plain))}
+    seconds = {name: [run.seconds for run in runs] for name, runs in (
+        ('ours', ours[longest]), ('plain', plain[longest]), ('twists', twists))}
     report.section(f'6. leg_fk bag, mcap to mcap, one core, start included: {longest} s at '
                    f'{_RATE} Hz, {_JOINTS} joints, two feet')
-    report.row('leg_fk bag, per message', figure([s / messages * 1e6 for s in seconds['ours']]),
-               'us')
-    report.row('plain loop, per message', figure([s / messages * 1e6 for s in seconds['plain']]),
-               'us')
+    for name, label in (('ours', 'leg_fk bag'), ('twists', 'leg_fk bag --twist'),
+                        ('plain', 'plain loop')):
+        report.row(f'{label}, per message', figure([s / messages * 1e6 for s in seconds[name]]),
+                   'us')
     report.row('plain / leg_fk bag', ratio(seconds['plain'], seconds['ours']), 'x', at_least=8.0)
     report.row('times real time', figure([longest / s for s in seconds['ours']]), 'x',
                at_least=60.0)

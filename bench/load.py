@@ -134,8 +134,8 @@ def _send(publish: Any, messages: list[bytearray], rate: float, count: int) -> l
 
 
 def observer(connection: Connection) -> None:
-    """Subscribe to poses: 'watch' topics, 'drop' them, 'take' what has come, know the 'first'."""
-    from geometry_msgs.msg import PoseStamped
+    """Subscribe to outputs: 'watch' topics, 'drop' them, 'take' what came, know the 'first'."""
+    from geometry_msgs.msg import PoseStamped, TwistStamped
     import rclpy
     from rclpy.experimental.events_executor import EventsExecutor
     node, qos = _node('observer')
@@ -149,8 +149,8 @@ def observer(connection: Connection) -> None:
         arrived: list[tuple[int, bytes]] = []
         received[topic] = arrived
         subscriptions[topic] = node.create_subscription(
-            PoseStamped, topic, lambda data: arrived.append((time.time_ns(), data)), qos,
-            raw=True)
+            TwistStamped if topic.endswith('/twist') else PoseStamped, topic,
+            lambda data: arrived.append((time.time_ns(), data)), qos, raw=True)
 
     def take(topic: str, count: int) -> Received:
         arrived = received[topic]

@@ -11,7 +11,7 @@ from contextlib import closing, ExitStack
 from typing import NamedTuple
 
 from bench.measure import difference, figure, percentile, ratio
-from bench.node_process import Bench, NodeProcess, Stretch, TIPS
+from bench.node_process import Bench, NodeProcess, POSES, Stretch, TWISTS
 from bench.report import Report
 
 _JOINTS = 32
@@ -56,12 +56,13 @@ def _measure_side_by_side(report: Report, bench: Bench, effort: Effort) -> None:
             'floor': NodeProcess('floor', 'floor'),
             'ours': NodeProcess('ours', 'ours'),
             'plain': NodeProcess('plain', 'plain'),
+            'twists': NodeProcess('twists', 'ours', (*POSES, *TWISTS), ('publish_twist:=true',)),
             'extras': NodeProcess('extras', 'ours', parameters=_EXTRAS),
-            'unwatched': NodeProcess('unwatched', 'ours', tips=()),
+            'unwatched': NodeProcess('unwatched', 'ours', outputs=()),
             'decode': NodeProcess('decode', 'decode'),
             'send': NodeProcess('send', 'send'),
-            'receive': NodeProcess('receive', 'receive', tips=()),
-            'dds': NodeProcess('dds', 'dds', tips=()),
+            'receive': NodeProcess('receive', 'receive', outputs=()),
+            'dds': NodeProcess('dds', 'dds', outputs=()),
             'bare': NodeProcess('bare', 'bare'),
         }.items()}
         turns = _take_turns(bench, nodes, effort)
@@ -74,6 +75,7 @@ def _measure_side_by_side(report: Report, bench: Bench, effort: Effort) -> None:
     report.section(f'1. CPU per message, two feet, {_RATE:.0f} Hz, {_JOINTS} joints')
     for name in ('floor', 'ours', 'plain'):
         report.row(name, figure(cpu[name]), 'us')
+    report.row('ours with two twists beside', figure(cpu['twists']), 'us')
     report.row('ours / floor', ratio(cpu['ours'], cpu['floor']), 'x', at_most=1.3)
     report.row('ours / plain', ratio(cpu['ours'], cpu['plain']), 'x', at_most=0.28)
     report.section('2. latency, JointState sent to PoseStamped received')
@@ -129,7 +131,8 @@ def _measure_starts(report: Report, bench: Bench, effort: Effort) -> None:
         report.row(name, figure(readings), 's')
     # By pairs, for Fast DDS's discovery takes 0.05 s or up to 3 s as luck will have it: it
     # announces a participant before that listens, and who answers at once is not heard.
-    report.row('ours less bare', difference(seconds['ours'], seconds['bare']), 's', at_most=0.5)
+    report.row('ours less bare, pair by pair', difference(seconds['ours'], seconds['bare']), 's',
+               at_most=0.5)
 
 
 def _measure_saturation(report: Report, bench: Bench, effort: Effort) -> None:
@@ -173,10 +176,10 @@ def _measure_growth(report: Report, bench: Bench, effort: Effort) -> None:
             _grow(report, bench, nodes, 'rate', rate, _JOINTS, rate, effort)
         for node in nodes.values():
             bench.forget(node)
-    chains, tips = ['left_leg', 'right_leg', 'head_imu'], [*TIPS, 'head_imu']
+    chains, poses = ['left_leg', 'right_leg', 'head_imu'], [*POSES, 'head_imu/pose']
     for count in range(1, 1 + len(chains)):
         parameters = (f'chains:=[{",".join(chains[:count])}]', 'head_imu.version:=v2')
-        node = NodeProcess(f'chains_{count}', 'ours', tips[:count], parameters).start()
+        node = NodeProcess(f'chains_{count}', 'ours', poses[:count], parameters).start()
         with closing(node):
             _match(bench, [node])
             _grow(report, bench, {'ours': node}, 'chains', count, _JOINTS, _RATE, effort)

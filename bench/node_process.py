@@ -11,7 +11,8 @@ from typing import NamedTuple
 from bench.load import Process, Received
 from bench.measure import cpu_ns, resident_bytes
 
-TIPS = ('left_foot', 'right_foot')
+POSES = ('left_foot/pose', 'right_foot/pose')
+TWISTS = ('left_foot/twist', 'right_foot/twist')
 DEPTH = 1000
 
 
@@ -38,14 +39,14 @@ class NodeProcess:
     Args:
         namespace: the namespace, which also tells runs of the same node apart.
         name: `ours`, or the name of a reference node.
-        tips: the topics that the observer shall subscribe to.
+        outputs: the topics that the observer shall subscribe to.
         parameters: parameters of ours beside the QoS.
     """
 
-    def __init__(self, namespace: str, name: str, tips: Sequence[str] = TIPS,
+    def __init__(self, namespace: str, name: str, outputs: Sequence[str] = POSES,
                  parameters: Sequence[str] = ()) -> None:
         self.joint_topic = f'/{namespace}/joint_states'
-        self.pose_topics = [f'/{namespace}/foot_pose_publisher/{tip}/pose' for tip in tips]
+        self.topics = [f'/{namespace}/foot_pose_publisher/{output}' for output in outputs]
         command = [sys.executable, '-m', 'bench.reference_nodes', name]
         ros_arguments = ['--ros-args', '-r', f'__ns:=/{namespace}', '--log-level', 'warn']
         if name == 'ours':
@@ -54,7 +55,7 @@ class NodeProcess:
             for parameter in (*parameters, f'{joints}.reliability:=reliable',
                               f'{joints}.depth:={DEPTH}',
                               *(f'qos_overrides.{topic}.publisher.depth:={DEPTH}'
-                                for topic in self.pose_topics)):
+                                for topic in self.topics)):
                 ros_arguments += ['-p', parameter]
         self._command = [*command, *ros_arguments]
 
@@ -95,8 +96,8 @@ class Bench:
         self._observer.close()
 
     def watch(self, node: NodeProcess) -> None:
-        """Subscribe to a node's poses."""
-        for topic in node.pose_topics:
+        """Subscribe to a node's outputs."""
+        for topic in node.topics:
             self._observer('watch', topic)
 
     def match(self, node: NodeProcess) -> None:
@@ -105,13 +106,13 @@ class Bench:
             raise RuntimeError(f'no node has subscribed to {node.joint_topic}')
         for _ in range(100):
             self._robot('send', node.joint_topic, 32, 100.0, 5)
-            if all(self._observer('take', topic, 1 << 30).stamps for topic in node.pose_topics):
+            if all(self._observer('take', topic, 1 << 30).stamps for topic in node.topics):
                 return
-        raise RuntimeError(f'no poses from {node.pose_topics}')
+        raise RuntimeError(f'nothing from {node.topics}')
 
     def forget(self, node: NodeProcess) -> None:
         """Take down all that was made for a node."""
-        for topic in node.pose_topics:
+        for topic in node.topics:
             self._observer('drop', topic)
         self._robot('close', node.joint_topic)
 
@@ -122,11 +123,11 @@ class Bench:
         self._robot.answer()
         started = time.time_ns()
         node.start()
-        first = self._observer('first', node.pose_topics[0])
+        first = self._observer('first', node.topics[0])
         self._robot('stop', '')
         if first is None:
-            raise RuntimeError(f'no pose from {node.pose_topics[0]}')
-        for topic in node.pose_topics:
+            raise RuntimeError(f'nothing from {node.topics[0]}')
+        for topic in node.topics:
             self._observer('take', topic, 1 << 30)
         return float((first - started) / 1e9)
 
@@ -134,7 +135,7 @@ class Bench:
         """Send messages through a node and return what was seen of them."""
         before = node.cpu_ns()
         sent = self._robot('send', node.joint_topic, joints, rate, count)
-        received = [self._observer('take', topic, count) for topic in node.pose_topics]
+        received = [self._observer('take', topic, count) for topic in node.topics]
         cpu = (node.cpu_ns() - before) / 1000 / count
         return Stretch(cpu, _latencies(sent, received),
                        sum(count - len(topic.arrivals) for topic in received),

@@ -39,12 +39,23 @@ def test_nodes_are_measured_beside_their_references(tmp_path):
     table, report = bench(tmp_path, 'node')
     rows = {row['name']: row for row in report['rows']}
     for name in ('ours / floor', 'ours / plain', 'p50, ours / floor', 'p99, ours / plain',
-                 'ours less bare', 'ours less bare, fastest of each'):
+                 'ours less bare', 'ours less bare, pair by pair'):
         assert rows[name]['at_most'] is not None
         assert name in table
     assert rows['stretches out of order']['median'] == 0
     assert set(report['growth']) == {'joints', 'chains', 'rate'}
     assert (tmp_path / 'b.png').read_bytes().startswith(b'\x89PNG')
+
+
+def test_bags_are_measured_beside_the_plain_loop(tmp_path):
+    pytest.importorskip('rosbags')
+    table, report = bench(tmp_path, 'bag')
+    rows = {row['name']: row for row in report['rows']}
+    for name in ('plain / leg_fk bag', 'times real time',
+                 'two bags of 2 s, --jobs 1 / --jobs 2'):
+        assert rows[name]['at_least'] is not None
+        assert name in table
+    assert set(report['growth']) == {'bag'}
 
 
 def test_the_plain_references_compute_the_same_robot():
