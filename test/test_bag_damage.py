@@ -7,6 +7,7 @@ import sqlite3
 import struct
 
 from bag_files import entries, LEFT_POSE, poses_of, read_bag, walk, write_bag
+from icub_leg_fk.tools.bags import mcap_large
 from icub_leg_fk.tools.bags import mcap_records as mcap
 from icub_leg_fk.tools.leg_fk import main
 from leg_fk_process import assert_one_line_complaint, leg_fk
@@ -142,11 +143,15 @@ def damaged(data, dice):
     return bytes(data)
 
 
-@pytest.mark.parametrize(('storage', 'compression'), [
-    ('mcap', None), ('mcap', 'storage'), ('mcap', 'file'), ('sqlite3', None),
-    ('sqlite3', 'message')])
-def test_no_damage_ends_in_an_exception(tmp_path, capsys, storage, compression):
+@pytest.mark.parametrize(('storage', 'compression', 'large'), [
+    ('mcap', None, False), ('mcap', 'storage', False), ('mcap', 'file', False),
+    ('mcap', None, True), ('mcap', 'storage', True),
+    ('sqlite3', None, False), ('sqlite3', 'message', False)])
+def test_no_damage_ends_in_an_exception(tmp_path, capsys, monkeypatch, storage, compression,
+                                        large):
     """In this process, where an exception that is not one line for the user comes through."""
+    if large:
+        monkeypatch.setattr(mcap_large, '_LARGE', 1000)
     dice = random.Random(f'{storage} {compression}')
     write_bag(tmp_path / 'in', storage, joints=walk(60), compression=compression)
     file = next(path for path in (tmp_path / 'in').iterdir() if path.name != 'metadata.yaml')

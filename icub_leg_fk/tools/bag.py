@@ -119,7 +119,7 @@ def _name(bag: Path, storage: str | None) -> str:
     name = re.sub(r'(\.mcap|\.db3)\.zstd$', r'\1', os.path.basename(os.path.abspath(bag)))
     stem, ending = os.path.splitext(name)
     if storage and ending in KINDS:
-        return stem + next(ending for ending, (kind, _) in KINDS.items() if kind == storage)
+        return stem + next(ending for ending, kind in KINDS.items() if kind == storage)
     return name
 
 

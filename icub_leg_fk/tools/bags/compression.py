@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from icub_leg_fk.errors import MissingDependencyError
 
 ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
 _PIECE = 1 << 16
+_PORTION = 1 << 11
 
 
 def decompress(compression: str, data: bytes) -> bytes:
@@ -31,6 +32,32 @@ def decompress(compression: str, data: bytes) -> bytes:
         return bytes(decompressor.decompress(data))
     except errors as error:
         raise ValueError(f'damaged {compression} data') from error
+
+
+def decompress_pieces(compression: str, pieces: Iterable[bytes]) -> Iterator[bytes]:
+    """Yield data decompressed, as far as it goes, in pieces.
+
+    Args:
+        compression: `zstd`, `lz4` or nothing.
+        pieces: one compressed frame, maybe cut off.
+
+    Raises:
+        ValueError: the data is damaged, or the compression unknown.
+        MissingDependencyError: no library for it is installed.
+    """
+    if not compression:
+        yield from pieces
+        return
+    decompressor, errors = _decompressor(compression)
+    for piece in pieces:
+        # A little at a time, for it may grow by a factor of thousands.
+        for at in range(0, len(piece), _PORTION):
+            try:
+                yield decompressor.decompress(piece[at:at + _PORTION])
+            except errors as error:
+                raise ValueError(f'damaged {compression} data') from error
+            if decompressor.eof:
+                return
 
 
 def compressor(compression: str) -> Callable[[bytes], bytes]:

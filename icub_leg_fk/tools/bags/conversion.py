@@ -146,6 +146,9 @@ class _Job:
         notes = list(self._notes)
         if self._bag.attachments:
             notes.append(f'{self._bag.attachments} MCAP attachments are not copied')
+        if self._bag.late:
+            notes.append(f'{self._bag.late} messages stay behind others that were recorded after '
+                         'them: they are too far out of order to be sorted')
         return Summary(
             target=target,
             copied=sum(counts) - sum(added.values()),
@@ -210,7 +213,7 @@ def _storage(target: Path, asked: str) -> str:
     """Return the storage that the target's name or an option asks for; empty if neither."""
     if target.suffix not in KINDS:
         return asked
-    named = KINDS[target.suffix][0]
+    named = KINDS[target.suffix]
     if asked and asked != named:
         raise OutputFileError(f'{target}: found a name for {named} and --storage {asked}, '
                               'allowed: one that agrees, or a name without such an ending')
@@ -222,7 +225,7 @@ def _storage_file(bag: Path, storage: str) -> Path:
     if bag.suffix in KINDS:
         return bag
     bag.mkdir()
-    ending = next(ending for ending, (name, _) in KINDS.items() if name == storage)
+    ending = next(ending for ending, name in KINDS.items() if name == storage)
     return bag / f'{bag.name}_0{ending}'
 
 

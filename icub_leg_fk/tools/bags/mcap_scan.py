@@ -8,15 +8,17 @@ damaged part hides is found again with the chunk index, if there is one.
 from __future__ import annotations
 
 from contextlib import suppress
+from io import BytesIO
+from pathlib import Path
 import struct
 from typing import BinaryIO
 import zlib
 
 from icub_leg_fk.tools.bags import mcap_records as mcap
 from icub_leg_fk.tools.bags.compression import decompress
+from icub_leg_fk.tools.bags.mcap_large import is_large, note_message, plain_file, records
 from icub_leg_fk.tools.bags.topics import Topic
 
-_BLOCK = 1 << 20
 _LARGEST_DESCRIPTION = 1 << 26  # bytes of a schema or channel record
 _LARGEST_CHUNK = 1 << 30
 _CHUNK_HEAD = 64  # bytes, at least: times, size, CRC, name of the compression, size
@@ -28,6 +30,7 @@ class McapScan:
     Args:
         file: the file.
         size: its size.
+        scratch: directory for what has to be decompressed to be read.
 
     Attributes:
         topics: its topics by channel.
@@ -36,13 +39,14 @@ class McapScan:
         attachments: how many attachments it has.
     """
 
-    def __init__(self, file: BinaryIO, size: int) -> None:
+    def __init__(self, file: BinaryIO, size: int, scratch: Path) -> None:
         self.topics: dict[int, Topic] = {}
         self.spans: list[mcap.Span] = []
         self.damage: list[str] = []
         self.attachments = 0
         self._file = file
         self._size = size
+        self._scratch = scratch
         self._schemas: dict[int, tuple[str, str, str]] = {}
         self._indexed: list[int] = []
         self._channels_expected: int | None = None
@@ -85,7 +89,7 @@ class McapScan:
                 return None
             if number == mcap.MESSAGE:
                 head += self._file.read(mcap.MESSAGE_HEAD.size - mcap.RECORD.size)
-                self._note_message(head, at, end)
+                note_message(self.spans, head, at, end)
             elif number == mcap.ATTACHMENT:
                 self.attachments += 1
             elif number in (mcap.SCHEMA, mcap.CHANNEL, mcap.CHUNK_INDEX, mcap.STATISTICS):
@@ -136,17 +140,6 @@ class McapScan:
             self.spans.append(mcap.Span(start, at, end, present, present == data_size,
                                         compression, plain_size, crc))
 
-    def _note_message(self, head: bytes, at: int, end: int) -> None:
-        if len(head) < mcap.MESSAGE_HEAD.size:
-            return
-        time = mcap.MESSAGE_HEAD.unpack(head)[4]
-        last = self.spans[-1] if self.spans else None
-        if last and not last.plain_size and last.offset + last.size == at and last.size < _BLOCK:
-            self.spans[-1] = last._replace(start=min(last.start, time), end=max(last.end, time),
-                                           size=end - last.offset)
-        else:
-            self.spans.append(mcap.Span(time, at, time, end - at))
-
     def _use_index(self, stopped: int) -> None:
         """Find the chunks behind an unreadable place with the summary, if that can be read."""
         self._indexed.clear()
@@ -167,15 +160,18 @@ class McapScan:
 
     def _describe_chunk(self, span: mcap.Span) -> None:
         """Take note of the schemas and channels inside a chunk."""
-        data, at = b'', 0
         with suppress(ValueError):  # told when its messages are read
-            data = span_data(self._file, span)
-        while at + mcap.RECORD.size <= len(data):
-            number, size = mcap.RECORD.unpack_from(data, at)
-            end = at + mcap.RECORD.size + size
-            if number in (mcap.SCHEMA, mcap.CHANNEL) and end <= len(data):
-                self._note(number, data[at + mcap.RECORD.size:end])
-            at = end
+            if is_large(span):
+                file, at, end = plain_file(self._file, span, self._scratch)
+            else:
+                data = span_data(self._file, span)
+                file, at, end = BytesIO(data), 0, len(data)
+            for number, start, behind in records(file, at, end):
+                if number in (mcap.SCHEMA, mcap.CHANNEL):
+                    file.seek(start + mcap.RECORD.size)
+                    self._note(number, file.read(behind - start - mcap.RECORD.size))
+            if file is not self._file:
+                file.close()
 
 
 def span_data(file: BinaryIO, span: mcap.Span) -> bytes:

@@ -109,9 +109,8 @@ class McapWriter:
         self._file.close()
 
     def _put(self, *pieces: bytes) -> None:
-        data = b''.join(pieces)
-        self._file.write(data)
-        self._at += len(data)
+        self._file.writelines(pieces)
+        self._at += sum(map(len, pieces))
 
     def _end_chunk(self) -> None:
         used = [(topic, places) for topic, places in enumerate(self._places) if places]
@@ -120,9 +119,9 @@ class McapWriter:
         plain = b''.join(self._pieces)
         data = self._compress(plain)
         chunk_at = self._at
-        self._put(mcap.record(
-            mcap.CHUNK, struct.pack('<QQQI', start, end, len(plain), zlib.crc32(plain)),
-            mcap.text(self._compression), struct.pack('<Q', len(data)), data))
+        head = (struct.pack('<QQQI', start, end, len(plain), zlib.crc32(plain))
+                + mcap.text(self._compression) + struct.pack('<Q', len(data)))
+        self._put(mcap.RECORD.pack(mcap.CHUNK, len(head) + len(data)), head, data)
         chunk_size = self._at - chunk_at
         index_at, offsets = self._at, []
         for topic, places in used:

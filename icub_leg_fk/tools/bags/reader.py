@@ -16,9 +16,8 @@ from icub_leg_fk.tools.bags.metadata import OldMetadata, read_metadata
 from icub_leg_fk.tools.bags.sqlite_reader import SqliteFile, torn_bytes
 from icub_leg_fk.tools.bags.topics import Message, Topic
 
-KINDS: Mapping[str, tuple[str, type[McapFile] | type[SqliteFile]]] = {
-    '.mcap': ('mcap', McapFile), '.db3': ('sqlite3', SqliteFile)}
-"""Storage and class by the ending of a file's name."""
+KINDS: Mapping[str, str] = {'.mcap': 'mcap', '.db3': 'sqlite3'}
+"""Storage by the ending of a file's name."""
 
 _ENDING = re.compile(r'(\.mcap|\.db3)(\.zstd)?$')
 
@@ -45,6 +44,7 @@ class BagReader:
         custom_data: a user's own entries of the metadata.
         damage: what could not be read, as far as it is known.
         attachments: how many MCAP attachments there are.
+        late: messages behind others that were recorded after them, too far off to be sorted.
         progress: share of the bag that has been read, 0 to 1.
 
     Raises:
@@ -56,6 +56,7 @@ class BagReader:
         self.topics: list[Topic] = []
         self.damage: list[str] = []
         self.attachments = 0
+        self.late = 0
         self.progress = 0.0
         self._scratch = scratch
         self._made: list[Path] = []
@@ -68,7 +69,7 @@ class BagReader:
             reason = self.damage[0] if self.damage else 'it has no topics'
             raise InputFileError(f'{path}: nothing can be read: {reason}')
         self._add_silent_topics()
-        self.storage = KINDS[self._files[0].ending][0]
+        self.storage = KINDS[self._files[0].ending]
 
     def blocks(self, wanted: Collection[int]) -> Iterator[list[Message]]:
         """Yield the messages, file by file and in order of their time, some at a time.
@@ -84,7 +85,7 @@ class BagReader:
             found: list[str] = []
             plain = self._plain(file.path, file.compressed, found)
             try:
-                storage = KINDS[file.ending][1](plain)
+                storage = self._open(plain, file.ending)
                 plain_size = max(plain.stat().st_size, 1)
                 indices = {number: index for number, index in file.indices.items()
                            if index in wanted}
@@ -93,6 +94,7 @@ class BagReader:
                     self.progress = (before + size * share) / max(sum(sizes), 1)
                     yield self._uncompressed(block)
                 self._blame(file.path, found + storage.damage)
+                self.late += storage.late
             finally:
                 self._clear_scratch()
             before += size
@@ -139,7 +141,7 @@ class BagReader:
         found: list[str] = []
         plain = self._plain(path, compressed, found)
         try:
-            storage = KINDS[ending][1](plain)
+            storage = self._open(plain, ending)
         finally:
             self._clear_scratch()
         if not storage.topics:
@@ -148,6 +150,9 @@ class BagReader:
         self.compression = self.compression or storage.compression
         return _StorageFile(path, ending, compressed, {
             number: self._index(topic) for number, topic in storage.topics.items()})
+
+    def _open(self, path: Path, ending: str) -> McapFile | SqliteFile:
+        return McapFile(path, self._scratch) if ending == '.mcap' else SqliteFile(path)
 
     def _index(self, topic: Topic) -> int:
         known = next((known for known in self._metadata.topics

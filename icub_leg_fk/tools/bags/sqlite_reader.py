@@ -31,11 +31,13 @@ class SqliteFile:
         damage: what could not be read.
         compression: none; here for the likeness of MCAP.
         attachments: none.
+        late: none; they are sorted by an index.
         done: bytes read so far.
     """
 
     compression = ''
     attachments = 0
+    late = 0
 
     def __init__(self, path: Path) -> None:
         self.path = path
