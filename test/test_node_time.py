@@ -67,7 +67,7 @@ def test_looping_bag_gives_every_pose_in_every_loop_and_is_said_once():
         stamps = [first + 10 * MS * i for i in range(200)]
         for stamp in stamps * 4:
             robot.send(stamp)
-        robot.until(lambda: len(robot.right) == 800, 'all poses')
+        robot.until(lambda: len(robot.left) == len(robot.right) == 800, 'all poses')
         assert robot.left.stamps() == robot.right.stamps() == stamps * 4
         said = [line for line in node.log().splitlines() if 'time stepped back' in line]
         assert len(said) == 1
@@ -77,7 +77,7 @@ def test_short_loop_within_the_timeout_is_noticed_too(robot):
     stamps = [robot.start + i for i in range(1, 4)]
     for stamp in stamps * 2:
         robot.send(stamp)
-    robot.until(lambda: len(robot.right) == 6, 'all poses')
+    robot.until(lambda: len(robot.left) == len(robot.right) == 6, 'all poses')
     assert robot.right.stamps() == stamps * 2
 
 

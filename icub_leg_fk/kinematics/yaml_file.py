@@ -38,8 +38,11 @@ def read_nodes(path: str | Path) -> tuple[str, yaml.Node]:
     except yaml.YAMLError as error:
         mark = getattr(error, 'problem_mark', None) or getattr(error, 'context_mark', None)
         problem = getattr(error, 'problem', None) or getattr(error, 'context', None) or error
+        line = mark.line + 1 if mark else 0
+        if 'nesting depth' in str(problem):  # libyaml looks ahead, and has a limit of its own
+            _fail_too_deep(file, line)
         found = f'no YAML: {" ".join(str(problem).split())}'
-        _fail(file, mark.line + 1 if mark else 0, found, 'well-formed YAML')
+        _fail(file, line, found, 'well-formed YAML')
     if node is None:
         _fail(file, 0, 'nothing', 'units and chains')
     return file, node
@@ -47,6 +50,10 @@ def read_nodes(path: str | Path) -> tuple[str, yaml.Node]:
 
 def _fail(file: str, line: int, found: str, allowed: str) -> NoReturn:
     raise CatalogError(file, line, 'kinematics file', found, allowed) from None
+
+
+def _fail_too_deep(file: str, line: int) -> NoReturn:
+    _fail(file, line, f'more than {MAX_DEPTH} nested levels', f'at most {MAX_DEPTH}')
 
 
 def _read(file: str, path: str | Path) -> bytes:
@@ -91,4 +98,4 @@ def _refuse_surprises(file: str, text: str) -> None:
         depth += isinstance(event, yaml.CollectionStartEvent)
         depth -= isinstance(event, yaml.CollectionEndEvent)
         if depth > MAX_DEPTH:
-            _fail(file, line, f'more than {MAX_DEPTH} nested levels', f'at most {MAX_DEPTH}')
+            _fail_too_deep(file, line)
