@@ -45,6 +45,14 @@ def test_help_imports_nothing_heavy(words):
     assert heavy.isdisjoint(done.stderr.split())
 
 
+def test_options_may_stand_anywhere():
+    expected = leg_fk('urdf', 'left_leg', 'right_leg', '--version', 'v1')
+    assert expected.returncode == 0 and 'right_leg v1' in expected.stdout
+    for words in (['left_leg', '--version', 'v1', 'right_leg'],
+                  ['--version', 'v1', 'left_leg', 'right_leg']):
+        assert leg_fk('urdf', *words).stdout == expected.stdout
+
+
 def test_a_command_imports_only_its_own_module():
     program = ('import sys; from icub_leg_fk.tools.leg_fk import main; main(["list"]); '
                "print(*sorted(sys.modules), sep='\\n', file=sys.stderr)")

@@ -70,6 +70,22 @@ class Parser(argparse.ArgumentParser):
         raise LegFKError(f'{message} (see {self.prog} -h)')
 
 
+class CommandParser(Parser):
+    """The parser of one subcommand, whose options may stand anywhere: `bag IN --twist OUT`."""
+
+    _mixing = False
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse the arguments."""
+        if self._mixing:  # argparse comes back here for each of its two passes
+            return super().parse_known_args(args, namespace)
+        self._mixing = True
+        try:
+            return self.parse_known_intermixed_args(args, namespace)
+        finally:
+            self._mixing = False
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command.
 
@@ -112,7 +128,8 @@ def _parser(words: Sequence[str]) -> Parser:
     """Return the parser: of the one subcommand that is asked for, else of all."""
     parser = Parser(prog='leg_fk', description=DESCRIPTION, epilog=EXAMPLES)
     parser.add_argument('--version', action='version', version=f'leg_fk {__version__}')
-    subparsers = parser.add_subparsers(title='commands', metavar='COMMAND', required=True)
+    subparsers = parser.add_subparsers(title='commands', metavar='COMMAND', required=True,
+                                       parser_class=CommandParser)
     chosen = next((word for word in words if not word.startswith('-')), '')
     for name in (chosen,) if chosen in MODULES else MODULES:
         module = import_module(f'icub_leg_fk.tools.{MODULES[name]}')
