@@ -82,4 +82,4 @@ def _peer(name: str, chain: Chain, vectors: list[tuple[float, ...]],
                 return f'computes another robot, {error:.1e} off'
             return answer
         problems.append(run.stderr.strip().splitlines()[-1])
-    return problems[0]
+    return '; '.join(dict.fromkeys(problems))

@@ -4,8 +4,8 @@ A script of its own, free of this project, so that it also runs in the system's 
 where Debian's PyKDL is. TASK is JSON: `links` (rows a, d, alpha, offset), `T_root_0` (4x4), `Q`
 (N joint vectors) and `seconds`. The answer is JSON: `version`, `poses` (of the first joint
 vectors, as 4x4 matrices), and readings [us per pose] of `one` (pose and quaternion, dropped) and
-`many` (an array for all of Q: of poses with quaternions by a loop as the library's examples write
-it, or of matrices by one call where the library takes all of Q).
+`many` (what comes of all of Q, kept: poses with quaternions by a loop as the library's examples
+write it, or matrices by one call where the library takes all of Q).
 """
 
 from __future__ import annotations
@@ -72,7 +72,6 @@ def pinocchio(task: dict[str, Any]) -> dict[str, Any]:
 
 def pykdl(task: dict[str, Any]) -> dict[str, Any]:
     """PyKDL: ChainFkSolverPos_recursive, Rotation.GetQuaternion."""
-    import numpy as np
     import PyKDL as kdl
     root = task['T_root_0']
     chain = kdl.Chain()
@@ -96,12 +95,11 @@ def pykdl(task: dict[str, Any]) -> dict[str, Any]:
             solver.JntToCart(q, frame)
             frame.M.GetQuaternion()
 
-    out = np.empty((len(Q), 7))
-
     def loop() -> None:
-        for i, q in enumerate(Q):
+        out = []
+        for q in Q:
             solver.JntToCart(q, frame)
-            out[i] = *frame.p, *frame.M.GetQuaternion()
+            out.append((*frame.p, *frame.M.GetQuaternion()))
 
     def matrix(q: Any) -> list[list[float]]:
         solver.JntToCart(q, frame)

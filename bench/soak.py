@@ -105,6 +105,7 @@ def _soak(pid: int, minutes: float, rate: float, every: float) -> dict[str, Any]
         'minutes': windows[-1]['time'] / 60,
         'rate': rate,
         'messages': robot.sent,
+        'twists': robot.twists,
         'poses': sum(ledger.kept for ledger in ledgers),
         'lost': sum(ledger.lost for ledger in ledgers),
         'unexpected': sum(ledger.unexpected for ledger in ledgers),
@@ -149,7 +150,8 @@ def _failures(report: dict[str, Any]) -> list[str]:
 def _print(report: dict[str, Any]) -> None:
     faults = sum(report['faults'].values())
     print(f'\n{report["minutes"]:.1f} min: {report["messages"]} messages, '
-          f'{report["poses"]} poses, {faults} faults of {len(report["faults"])} kinds\n'
+          f'{report["poses"]} poses, {report["twists"]} twists, '
+          f'{faults} faults of {len(report["faults"])} kinds\n'
           f'lost {report["lost"]}, unexpected {report["unexpected"]}; memory grew by '
           f'{report["memory growth"]:.2f} MB after the first minute\n'
           f'latency p50 {report["p50"]:.0f} us, p99 {report["p99"]:.0f} us, late to early '

@@ -12,7 +12,7 @@ from typing import Any
 
 from bench.joint_messages import joint_positions, ROBOT_JOINTS
 from bench.soak_ledger import Ledger, Promise
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, TwistStamped
 from icub_leg_fk.kinematics import Catalog
 import rclpy
 from rclpy.duration import Duration
@@ -48,6 +48,7 @@ class SoakRobot:
         ledgers: by foot.
         latencies: of every tenth pose since they were last taken [us].
         sent: messages sent.
+        twists: twists received.
         faults: how often each fault was done.
         complaints: what else was not as it has to be.
     """
@@ -73,7 +74,7 @@ class SoakRobot:
                                for frame in FOOT_FRAMES] for foot, chain in FEET.items()}
         self.ledgers = {foot: Ledger(foot) for foot in FEET}
         self.latencies: list[float] = []
-        self.sent = 0
+        self.sent = self.twists = 0
         self._coming = itertools.cycle(self._all_faults())
         self._next_fault = 0.0
         self.faults: dict[str, int] = {}
@@ -81,6 +82,9 @@ class SoakRobot:
         for foot in FEET:
             self._node.create_subscription(
                 PoseStamped, f'foot_pose_publisher/{foot}/pose', self._receiver(foot), self._qos,
+                raw=True)
+            self._node.create_subscription(
+                TwistStamped, f'foot_pose_publisher/{foot}/twist', self._receive_twist, 10,
                 raw=True)
 
     def run(self, seconds: float, every: float) -> None:
@@ -145,6 +149,9 @@ class SoakRobot:
                 self._certain = True
         return receive
 
+    def _receive_twist(self, data: bytes) -> None:
+        self.twists += 1
+
     def _check(self, foot: str, promise: Promise, data: bytes) -> None:
         """Check that a pose is that of some configuration that has been set."""
         q = joint_positions(12, 2 * math.pi * promise.sample / SAMPLES)[:6]
@@ -185,6 +192,7 @@ class SoakRobot:
                 (['right_leg', 'left_leg'], ['left_leg', 'right_leg'])))),
             ('skeletons on or off', self._change('publish_markers',
                                                  itertools.cycle((True, False)))),
+            ('twists on or off', self._change('publish_twist', itertools.cycle((True, False)))),
             ('kinematics file change', self._change(
                 'kinematics_file', itertools.cycle((Catalog.load().file, '')))),
         ]
@@ -231,7 +239,7 @@ def _messages(order: random.Random) -> dict[str, list[bytearray]]:
 
     def add(kind: str, names: list[str], positions: list[float]) -> None:
         kinds.setdefault(kind, []).append(bytearray(serialize_message(
-            JointState(name=names, position=positions))))
+            JointState(name=names, position=positions, velocity=[0.1] * len(positions)))))
     names = list(ROBOT_JOINTS)
     reordered = order.sample(range(32), 32)
     knee = names.index('l_knee')
