@@ -6,7 +6,7 @@ meets all of them; every ratio is of two stretches that followed one another.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import closing, ExitStack
 from typing import NamedTuple
 
@@ -16,6 +16,8 @@ from bench.report import Report
 
 _JOINTS = 32
 _RATE = 1000.0  # Hz
+_COMPARED = ('floor', 'ours', 'plain')
+_MORE = ('ours', 'twists', 'extras', 'unwatched', 'decode', 'send', 'receive', 'dds')
 _EXTRAS = ('publish_twist:=true', 'publish_markers:=true')
 _RAMP = 1.25
 _BEHIND = 50_000.0  # us; a last pose so late tells that the node does not keep up
@@ -26,7 +28,7 @@ class Effort(NamedTuple):
     """How much is measured.
 
     Attributes:
-        rounds: turns of each node.
+        rounds: turns of each node; twice as many of those that are compared.
         messages: messages in a turn.
         starts: starts of each node.
         points: whether all points of the growth curves are measured.
@@ -65,29 +67,32 @@ def _measure_side_by_side(report: Report, bench: Bench, effort: Effort) -> None:
             'dds': NodeProcess('dds', 'dds', outputs=()),
             'bare': NodeProcess('bare', 'bare'),
         }.items()}
-        turns = _take_turns(bench, nodes, effort)
+        _match(bench, nodes.values())
+        turns = _take_turns(bench, nodes, _COMPARED, 2 * effort.rounds, effort.messages)
+        more = _take_turns(bench, nodes, _MORE, effort.rounds, effort.messages)
         resident = {name: node.resident_bytes() / 1e6 for name, node in nodes.items()}
         for node in nodes.values():
             bench.forget(node)
-    cpu = {name: [turn.cpu for turn in all_turns] for name, all_turns in turns.items()}
+    cpu, more_cpu = ({name: [turn.cpu for turn in stretches] for name, stretches in taken.items()}
+                     for taken in (turns, more))
     p50, p99 = ({name: [percentile(turn.latencies, percent) for turn in turns[name]]
-                 for name in ('floor', 'ours', 'plain')} for percent in (50, 99))
+                 for name in _COMPARED} for percent in (50, 99))
     report.section(f'1. CPU per message, two feet, {_RATE:.0f} Hz, {_JOINTS} joints')
-    for name in ('floor', 'ours', 'plain'):
+    for name in _COMPARED:
         report.row(name, figure(cpu[name]), 'us')
-    report.row('ours with two twists beside', figure(cpu['twists']), 'us')
+    report.row('ours with two twists beside', figure(more_cpu['twists']), 'us')
     report.row('ours / floor', ratio(cpu['ours'], cpu['floor']), 'x', at_most=1.3)
     report.row('ours / plain', ratio(cpu['ours'], cpu['plain']), 'x', at_most=0.28)
     report.section('2. latency, JointState sent to PoseStamped received')
-    for name in ('floor', 'ours', 'plain'):
+    for name in _COMPARED:
         report.row(f'{name}, p50', figure(p50[name]), 'us')
         report.row(f'{name}, p99', figure(p99[name]), 'us')
     report.row('p50, ours / floor', ratio(p50['ours'], p50['floor']), 'x', at_most=1.3)
     report.row('p99, ours / plain', ratio(p99['ours'], p99['plain']), 'x', at_most=0.6)
     report.section('4. what nobody subscribes to')
-    report.row('twist and skeleton on, unwatched / off', ratio(cpu['extras'], cpu['ours']), 'x',
-               at_most=1.1)
-    report.row('no topic watched', figure(cpu['unwatched']), 'us')
+    report.row('twist and skeleton on, unwatched / off', ratio(
+        more_cpu['extras'], more_cpu['ours']), 'x', at_most=1.1)
+    report.row('no topic watched', figure(more_cpu['unwatched']), 'us')
     report.section('7. memory: resident size')
     report.row('bare rclpy node', figure([resident['bare']]), 'MB')
     report.row('ours', figure([resident['ours']]), 'MB')
@@ -98,16 +103,17 @@ def _measure_side_by_side(report: Report, bench: Bench, effort: Effort) -> None:
             ('middleware receives', 'dds', None), ('executor takes', 'receive', 'dds'),
             ('middleware sends two', 'send', 'receive'), ('input rules', 'decode', 'send'),
             ('kinematics and two messages', 'ours', 'decode')):
-        report.row(label, difference(cpu[step], cpu[before] if before else [0.0] * effort.rounds),
-                   'us')
+        report.row(label, difference(more_cpu[step], more_cpu[before] if before
+                                     else [0.0] * effort.rounds), 'us')
 
 
-def _take_turns(bench: Bench, nodes: dict[str, NodeProcess], effort: Effort) -> Turns:
-    _match(bench, nodes.values())
-    turns: Turns = {name: [] for name in nodes}
-    for _ in range(effort.rounds):
-        for name, node in nodes.items():
-            turns[name].append(_whole_stretch(bench, node, _JOINTS, _RATE, effort.messages))
+def _take_turns(bench: Bench, nodes: dict[str, NodeProcess], names: Sequence[str], rounds: int,
+                messages: int) -> Turns:
+    """Send messages through some nodes in turns, forth and back, so that none is always first."""
+    turns: Turns = {name: [] for name in names}
+    for turn in range(rounds):
+        for name in names if turn % 2 == 0 else reversed(names):
+            turns[name].append(_whole_stretch(bench, nodes[name], _JOINTS, _RATE, messages))
     return turns
 
 
