@@ -19,6 +19,7 @@ _RATE = 1000.0  # Hz
 _COMPARED = ('floor', 'ours', 'plain')
 _MORE = ('ours', 'twists', 'extras', 'unwatched', 'decode', 'send', 'receive', 'dds')
 _EXTRAS = ('publish_twist:=true', 'publish_markers:=true')
+_RATES = (100.0, 300.0, 1000.0, 2000.0, 3000.0, 4500.0, 7000.0, 10000.0, 14000.0)  # Hz
 _RAMP = 1.25
 _BEHIND = 50_000.0  # us; a last pose so late tells that the node does not keep up
 _FASTEST = 60000.0  # Hz
@@ -178,8 +179,10 @@ def _measure_growth(report: Report, bench: Bench, effort: Effort) -> None:
         _match(bench, nodes.values())
         for joints in (12, 32, 64, 96, 128) if effort.points else (12, 128):
             _grow(report, bench, nodes, 'joints', joints, joints, _RATE, effort)
-        for rate in (100.0, 300.0, 1000.0, 2000.0, 3000.0, 4500.0) if effort.points else (100.0,):
-            _grow(report, bench, nodes, 'rate', rate, _JOINTS, rate, effort)
+        keeping_up = nodes
+        for rate in _RATES if effort.points else _RATES[:1]:
+            names = _grow(report, bench, keeping_up, 'rate', rate, _JOINTS, rate, effort)
+            keeping_up = {name: nodes[name] for name in names}
         for node in nodes.values():
             bench.forget(node)
     chains, poses = ['left_leg', 'right_leg', 'head_imu'], [*POSES, 'head_imu/pose']
@@ -193,13 +196,15 @@ def _measure_growth(report: Report, bench: Bench, effort: Effort) -> None:
 
 
 def _grow(report: Report, bench: Bench, nodes: dict[str, NodeProcess], panel: str, x: float,
-          joints: int, rate: float, effort: Effort) -> None:
-    """Add a point to each node's curve, unless the node cannot keep up."""
+          joints: int, rate: float, effort: Effort) -> list[str]:
+    """Add a point to the curve of each node that keeps up; return the names of these."""
     count = round(rate * effort.messages / _RATE / 2)
     turns: Turns = {name: [] for name in nodes}
     for _ in range(min(3, effort.rounds)):
         for name, node in nodes.items():
             turns[name].append(bench.stretch(node, joints, rate, count))
-    for name, stretches in turns.items():
-        if not any(stretch.lost or stretch.latencies[-1] > _BEHIND for stretch in stretches):
-            report.grow(panel, name, x, figure([stretch.cpu for stretch in stretches]))
+    keeping_up = [name for name, stretches in turns.items() if not any(
+        stretch.lost or stretch.latencies[-1] > _BEHIND for stretch in stretches)]
+    for name in keeping_up:
+        report.grow(panel, name, x, figure([stretch.cpu for stretch in turns[name]]))
+    return keeping_up

@@ -125,9 +125,9 @@ class Chain:
         Raises:
             JointVectorError: q has not n entries, or one is no finite number.
         """
-        if type(q) is not list and type(q) is not tuple:
-            q = self._joint_vectors(q, 1).tolist()
-        return self.solver.pose(q)
+        if type(q) is tuple or type(q) is list:
+            return self.solver.pose(q)
+        return self.solver.pose(self._joint_vectors(q, 1).tolist())
 
     def poses(self, Q: ArrayLike) -> Array:
         """Return the (N, 7) rows x, y, z [m], qx, qy, qz, qw of N joint vectors.
