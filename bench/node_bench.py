@@ -137,10 +137,11 @@ def _measure_starts(report: Report, bench: Bench, effort: Effort) -> None:
     report.section('4. start to first pose')
     for name, readings in seconds.items():
         report.row(name, figure(readings), 's')
-    # By pairs, for Fast DDS's discovery takes 0.05 s or up to 3 s as luck will have it: it
-    # announces a participant before that listens, and who answers at once is not heard.
-    report.row('ours less bare, pair by pair', difference(seconds['ours'], seconds['bare']), 's',
-               at_most=0.5)
+    # Fast DDS announces a participant before that listens (RTPSParticipantImpl::enable). Who
+    # answers too soon is not heard until it announces itself again, within 3 s; a third to a half
+    # of all starts meet this, of any node, so that medians of some starts differ by chance.
+    ours, bare = (percentile(seconds[name], 25) for name in ('ours', 'bare'))
+    report.row('ours less bare, lower quartiles', difference([ours], [bare]), 's', at_most=0.5)
 
 
 def _measure_saturation(report: Report, bench: Bench, effort: Effort) -> None:

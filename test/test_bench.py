@@ -39,7 +39,7 @@ def test_nodes_are_measured_beside_their_references(tmp_path):
     table, report = bench(tmp_path, 'node')
     rows = {row['name']: row for row in report['rows']}
     for name in ('ours / floor', 'ours / plain', 'p50, ours / floor', 'p99, ours / plain',
-                 'ours less bare', 'ours less bare, pair by pair'):
+                 'ours less bare', 'ours less bare, lower quartiles'):
         assert rows[name]['at_most'] is not None
         assert name in table
     assert rows['stretches out of order']['median'] == 0
