@@ -17,8 +17,7 @@ from bench.report import Report
 _JOINTS = 32
 _RATE = 1000.0  # Hz
 _COMPARED = ('floor', 'ours', 'plain')
-_MORE = ('ours', 'twists', 'extras', 'unwatched', 'decode', 'send', 'receive', 'dds',
-         'bare')
+_MORE = ('ours', 'twists', 'extras', 'unwatched', 'decode', 'send', 'receive', 'dds', 'bare')
 _EXTRAS = ('publish_twist:=true', 'publish_markers:=true')
 _RATES = (100.0, 300.0, 1000.0, 2000.0, 3000.0, 4500.0, 7000.0, 10000.0, 14000.0)  # Hz
 _RAMP = 1.25

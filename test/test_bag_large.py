@@ -1,5 +1,6 @@
 """`leg_fk bag` on bags that do not fit into memory: huge chunks, huge messages, wild disorder."""
 
+import struct
 import subprocess
 import sys
 
@@ -15,7 +16,7 @@ from bag_files import (
     TYPES,
 )
 from icub_leg_fk.tools.bags.time_queue import TimeQueue
-from leg_fk_process import leg_fk
+from leg_fk_process import assert_one_line_complaint, leg_fk
 import pytest
 
 mcap_writer = pytest.importorskip('mcap.writer')
@@ -101,6 +102,21 @@ def test_a_huge_chunk_that_does_not_match_its_checksum_is_left_out(tmp_path):
     assert done.returncode == 1, done
     assert 'does not match its checksum' in done.stdout
     assert read_bag_count(tmp_path / 'out.mcap') == 0
+
+
+@pytest.mark.parametrize('compression', ['none', 'zstd', 'lz4'])
+def test_a_cut_off_huge_chunk_that_holds_more_than_it_says_is_refused(tmp_path, compression):
+    """Its header is damaged: behind the record's number and length and two times is its size."""
+    text = ''.join(map(str, range(20_000)))
+    file = write_mcap(tmp_path / 'in.mcap', recording(2000, text, every=10), 100 * MB, compression)
+    data = bytearray(file.read_bytes())
+    chunk = data.index(b'\x06', 8 + 9 + struct.unpack_from('<Q', data, 9)[0])
+    size, = struct.unpack_from('<Q', data, chunk + 9 + 16)
+    assert size > 15 * MB
+    struct.pack_into('<Q', data, chunk + 9 + 16, 9 * MB)
+    file.write_bytes(data[:9 * len(data) // 10])
+    done = leg_fk('bag', file, tmp_path / 'out.mcap')
+    assert_one_line_complaint(done, 'nothing can be read')  # for its topics were in that chunk
 
 
 def read_bag_count(path):

@@ -14,6 +14,7 @@ from icub_leg_fk.tools.bags.compression import decompress_pieces
 _LARGE = 1 << 23
 _PART = 1 << 20
 _PIECE = 1 << 16
+_MISMATCH = 'does not match its checksum or size'
 
 
 def is_large(span: mcap.Span) -> bool:
@@ -39,11 +40,11 @@ def plain_file(file: BinaryIO, span: mcap.Span, scratch: Path) -> tuple[BinaryIO
             crc = zlib.crc32(piece, crc)
             size += len(piece)
             if size > span.plain_size:
-                break
+                raise ValueError(_MISMATCH)
             if plain:
                 plain.write(piece)
         if span.complete and (size != span.plain_size or (span.crc and crc != span.crc)):
-            raise ValueError('does not match its checksum or size')
+            raise ValueError(_MISMATCH)
     except ValueError as error:
         if plain:
             plain.close()
