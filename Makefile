@@ -24,7 +24,7 @@ demo: .venv/.ros
 	.venv/bin/leg_fk demo
 
 test: .venv/.test
-	$(PYTEST) --durations=10 $(ARGS)
+	$(PYTEST) --numprocesses=auto --maxprocesses=4 --dist=loadfile --durations=10 $(ARGS)
 
 lint: .venv/.test
 	$(PYTEST) test/test_lint.py test/test_flake8.py test/test_pep257.py

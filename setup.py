@@ -15,6 +15,7 @@ TEST = [
     'mcap',
     'pin',
     'pytest>=7.4',
+    'pytest-xdist',
     'rosbags>=0.10',
     'setuptools<80',
 ]

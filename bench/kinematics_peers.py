@@ -46,7 +46,7 @@ def pinocchio(task: dict[str, Any]) -> dict[str, Any]:
         joint = model.addJoint(joint, pin.JointModelRZ(), before * turned, f'joint_{i}')
         # Rz(theta) Tz(d) Tx(a) Rx(alpha), of which Rz(offset) may stand before the joint's turn.
         before = pin.SE3(pin.utils.rotate('x', alpha), np.array([a, 0.0, d]))
-    tip = model.addFrame(pin.Frame('tip', joint, before, pin.FrameType.OP_FRAME))
+    tip = model.addFrame(pin.Frame('tip', joint, 0, before, pin.FrameType.OP_FRAME))
     data = model.createData()
     Q = np.array(task['Q'])
 

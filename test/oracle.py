@@ -77,7 +77,7 @@ class PinocchioArm:
             placement = along_z * along_x * pin.SE3(pin.utils.rotate('x', alpha), np.zeros(3))
         placement = placement * pin.SE3(T_n_tip @ (SOLE if frame == 'sole' else np.eye(4)))
         self.tip = self.model.addFrame(
-            pin.Frame('tip', joint, placement, pin.FrameType.OP_FRAME))
+            pin.Frame('tip', joint, 0, placement, pin.FrameType.OP_FRAME))
         self.data = self.model.createData()
 
     def forward(self, q: np.ndarray) -> np.ndarray:

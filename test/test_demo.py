@@ -136,10 +136,14 @@ def test_recorded_robot_can_be_played():
 @pytest.mark.parametrize(('version', 'foot_frame'), [('v1', 'dh'), ('v2_5', 'sole')])
 def test_poses_received_are_those_of_the_chains(version, foot_frame):
     """In the order of the messages, equal to the plain product of the DH matrices."""
+    from node_harness import LOSSLESS
+    namespace = '/leg_fk_test'
+    parameters = {name.format(ns=namespace): str(value) for name, value in LOSSLESS.items()}
+    parameters |= {'version': version, 'foot_frame': foot_frame}
     catalog = Catalog.load()
     gait = walk(catalog, version, seconds=0.5)
-    with player.Replay(gait, '/leg_fk_test', TIPS) as replay, \
-            NodeProcess('/leg_fk_test', {'version': version, 'foot_frame': foot_frame}) as node:
+    with player.Replay(gait, namespace, TIPS) as replay, \
+            NodeProcess(namespace, parameters) as node:
         replay.wait_for_node(node.check)
         replay.play(lambda elapsed: None, 0.1, node.check)
     for answers, name, q in zip(replay.answers, ('left_leg', 'right_leg'),

@@ -141,7 +141,7 @@ def test_frame_prefix_holds_for_twists_and_topics_go_when_they_are_switched_off(
     _, answers = twists.settle()
     assert answers['left_foot'][0].header.frame_id == 'a/root_link'
     topic = node.topic('left_foot/twist')
-    assert robot.node.count_publishers(topic) == 1
+    robot.until(lambda: robot.node.count_publishers(topic) == 1, 'the twist topic')
     assert robot.change(publish_twist=False, frame_prefix='').successful
     robot.until(lambda: robot.node.count_publishers(topic) == 0, 'the twist topic to go')
 
@@ -219,9 +219,24 @@ def test_transforms_are_those_of_the_poses(foot_frame, children):
 
 
 def test_no_other_topic_is_offered_unless_asked_for():
+    poses, twists = ({f'{tip}/{kind}' for tip in FEET} for kind in ('pose', 'twist'))
     with NodeProcess(LOSSLESS) as node, Robot(node) as robot:
-        robot.connect()
-        offered = dict(robot.node.get_publisher_names_and_types_by_node(
-            'foot_pose_publisher', node.namespace))
-        own = {topic for topic in offered if topic.startswith(node.topic(''))}
-        assert own == {node.topic(f'{tip}/pose') for tip in FEET}
+        name, namespace, offered = 'foot_pose_publisher', node.namespace, set()
+
+        def offers(names):  # a node's name is announced apart from its topics
+            offered.clear()
+            if (name, namespace) in robot.node.get_node_names_and_namespaces():
+                found = robot.node.get_publisher_names_and_types_by_node(name, namespace)
+                offered.update(topic for topic, _ in found)
+            return {node.topic(name) for name in names} <= offered
+
+        def own():
+            return {topic for topic in offered if topic.startswith(node.topic(''))}
+        # Announcements come in order: once the twists are there, whatever was before them is.
+        assert robot.change(publish_twist=True).successful
+        robot.until(lambda: offers(poses | twists), ('twists', offered))
+        assert own() == {node.topic(name) for name in poses | twists}
+        assert '/tf' not in offered
+        assert robot.change(publish_twist=False).successful
+        robot.until(lambda: offers(poses) and len(own()) == len(poses), ('no twists', offered))
+        assert own() == {node.topic(name) for name in poses}

@@ -16,9 +16,9 @@ _MAGIC = b'SQLite format 3\x00'
 _FIRST_LEAP = 1_000_000  # ns
 _TOO_FAR = 1 << 60
 _COLUMNS = 'SELECT topic_id, timestamp, id, data FROM messages'
-_BY_TIME = (f'{_COLUMNS} WHERE timestamp >= ?1 AND (timestamp > ?1 OR id > ?2) '
+_BY_TIME = (f'{_COLUMNS} WHERE timestamp >= :time AND (timestamp > :time OR id > :number) '
             'ORDER BY timestamp, id')
-_BY_NUMBER = (f'{_COLUMNS} NOT INDEXED WHERE timestamp >= 0 AND id > ?2 '
+_BY_NUMBER = (f'{_COLUMNS} NOT INDEXED WHERE timestamp >= 0 AND id > :number '
               'ORDER BY id')  # the order of recording
 
 
@@ -97,11 +97,11 @@ class SqliteFile:
         block: list[Message] = []
         size, odd = 0, 0
         query, leap = _BY_TIME, 0
-        place = _first_time(database), -1
+        place = {'time': _first_time(database), 'number': -1}
         while leap < _TOO_FAR:
             try:
                 for topic, time, number, data in database.execute(query, place):
-                    place, leap = (time, number), 0
+                    place, leap = {'time': time, 'number': number}, 0
                     if type(data) is not bytes or topic not in self.topics:
                         odd += 1
                         continue
@@ -115,14 +115,17 @@ class SqliteFile:
                 break
             except sqlite3.DatabaseError as error:
                 # Leap over what is damaged, twice as far each time that leads nowhere.
-                time, number = place
+                time, number = place.values()
                 if not leap:
                     self.damage.append(f'messages behind number {number} (at {time / 1e9:.3f} s) '
                                        f'are unreadable: {error}')
                     if query is _BY_TIME and not _index_is_readable(database):
                         query = _BY_NUMBER
                 leap = 2 * leap or (1 if query is _BY_NUMBER else _FIRST_LEAP)
-                place = (time, number + leap) if query is _BY_NUMBER else (time + leap, -1)
+                if query is _BY_NUMBER:
+                    place['number'] += leap
+                else:
+                    place = {'time': time + leap, 'number': -1}
         self.done += size
         if odd:
             self.damage.append(f'{odd} messages have no topic or no data')
