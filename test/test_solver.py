@@ -190,6 +190,11 @@ def test_arrays_of_another_shape_are_refused(Q: object) -> None:
         LEG.poses(Q)
 
 
+def test_a_joint_vector_of_another_length_is_not_looked_up_in_the_ranges() -> None:
+    with pytest.raises(JointVectorError, match='found 5 values, allowed: 6'):
+        LEG.out_of_range([0.0] * 5)
+
+
 def test_numpy_and_integer_joint_vectors_are_welcome() -> None:
     expected = LEG.pose([1.0, 0.0, -1.0, 0.0, 0.0, 0.0])
     for q in (np.array([1, 0, -1, 0, 0, 0]), (1, 0, -1, 0, 0, 0), np.array([1.0, 0, -1, 0, 0, 0])):
@@ -209,5 +214,5 @@ def test_numpy_and_integer_joint_vectors_are_welcome() -> None:
     lambda: DHLink(0, 0, 0, lower=1, upper=-1),
 ])
 def test_a_chain_that_cannot_be_is_refused(mistake: object) -> None:
-    with pytest.raises(LegFKError):
+    with pytest.raises(LegFKError, match='found .*allowed: .'):
         mistake()  # type: ignore[operator]

@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+import re
 from xml.etree import ElementTree as ET
 
 from icub_leg_fk.kinematics import Catalog
@@ -89,6 +90,15 @@ def test_pinocchio_gives_our_poses_of_other_robots(write_urdf, file, name, versi
     chain = Catalog.load(file).chain(name, version)
     urdf = write_urdf('-k', str(file), '--version', version)
     assert largest_difference(urdf, chain) < TOLERANCE
+
+
+def test_a_rotation_that_was_typed_rounded_is_the_same_in_the_urdf(write_urdf, tmp_path):
+    file = tmp_path / 'scara.yaml'
+    rounded = '[[0.8660254, -0.5, 0, 0], [0.5, 0.8660259, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]'
+    file.write_text(re.sub(r'T_Ro0: .*', f'T_Ro0: {rounded}', SCARA))
+    urdf = write_urdf('-k', str(file), '--version', 'v1')
+    assert rounded in file.read_text()
+    assert largest_difference(urdf, Catalog.load(file).chain('scara', 'v1')) < TOLERANCE
 
 
 @pytest.mark.parametrize('foot_frame', ['dh', 'sole'])

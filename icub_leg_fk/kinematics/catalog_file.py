@@ -8,12 +8,13 @@ import math
 from pathlib import Path
 
 from icub_leg_fk.kinematics.link import DHLink, JOINT_TYPES
-from icub_leg_fk.kinematics.rotation import Array, is_rigid_transform
+from icub_leg_fk.kinematics.rotation import Array, is_rigid_transform, nearest_rotation
 from icub_leg_fk.kinematics.yaml_fields import Field, read_yaml, WORD
 import numpy as np
 
 _LENGTHS = ('mm', 'm')
 _ANGLES = ('deg', 'rad')
+_LONGEST = 1e9  # m; what is larger leaves no room to compute with
 _CHAIN = ('tip', 'root_frame', 'joints', 'tip_frames', 'versions')
 _DH = ('a', 'd', 'alpha', 'offset')
 
@@ -57,7 +58,10 @@ class _Units:
     def metres(self, field: Field) -> float:
         # Dividing, unlike multiplying by 1e-3, gives the float nearest to the printed value.
         value = field.number(self.length)
-        return value / 1000.0 if self.length == 'mm' else value
+        length = value / 1000.0 if self.length == 'mm' else value
+        if abs(length) > _LONGEST:
+            field.fail(f'a length up to {_LONGEST:g} m')
+        return length
 
     def radians(self, field: Field) -> float:
         value = field.number(self.angle)
@@ -65,14 +69,16 @@ class _Units:
 
     def transform(self, field: Field) -> Array:
         T = np.array([
-            [number.at(f'column {j}').number() for j, number in enumerate(
+            [self._entry(number.at(f'column {j}'), i, j) for j, number in enumerate(
                 row.at(f'row {i}').items('a row of 4 numbers', 4))]
             for i, row in enumerate(field.items('4 rows of 4 numbers', 4))])
-        if self.length == 'mm':
-            T[:3, 3] /= 1000.0
         if not is_rigid_transform(T):
             field.fail('a rotation, a translation and the last row 0 0 0 1', 'no rigid transform')
+        T[:3, :3] = nearest_rotation(T[:3, :3])
         return T
+
+    def _entry(self, field: Field, i: int, j: int) -> float:
+        return self.metres(field) if i < 3 and j == 3 else field.number()
 
 
 def read_catalog_file(path: str | Path) -> dict[str, ChainEntry]:

@@ -57,12 +57,16 @@ class Chain:
             msg = (f'chain {self.name}: found {len(self.joint_names)} joint names for '
                    f'{len(self.links)} links, allowed: one name per link, at least one link')
             raise LegFKError(msg)
-        if len(set(self.joint_names)) != len(self.joint_names):
-            raise LegFKError(f'chain {self.name}: a joint name stands twice')
+        for joint in self.joint_names:
+            if self.joint_names.count(joint) > 1:
+                msg = f'chain {self.name}: found joint {joint!r} twice, allowed: each joint once'
+                raise LegFKError(msg)
         for name in ('T_root_0', 'T_n_tip'):
             T = np.array(getattr(self, name), dtype=float)
             if T.shape != (4, 4) or not is_rigid_transform(T):
-                raise LegFKError(f'chain {self.name}: {name} is no rigid 4x4 transform')
+                msg = (f'chain {self.name}: {name}: found {" ".join(str(T.tolist()).split())}, '
+                       'allowed: a (4, 4) rotation and translation with the last row 0 0 0 1')
+                raise LegFKError(msg)
             T[:3, :3] = nearest_rotation(T[:3, :3])
             T.flags.writeable = False
             object.__setattr__(self, name, T)
@@ -183,7 +187,17 @@ class Chain:
         return self.twist_solver.twist(q, qdot)
 
     def out_of_range(self, q: Sequence[float]) -> tuple[str, ...]:
-        """Return the names of the joints whose position is outside its documented range."""
+        """Return the names of the joints whose position is outside its documented range.
+
+        Args:
+            q: n joint positions [rad or m].
+
+        Raises:
+            JointVectorError: q has not n entries.
+        """
+        if len(q) != len(self.links):
+            msg = f'joint vector: found {len(q)} values, allowed: {len(self.links)}'
+            raise JointVectorError(msg)
         return tuple(
             name for name, link, position in zip(self.joint_names, self.links, q, strict=True)
             if not link.lower <= position <= link.upper)

@@ -170,15 +170,20 @@ class PoseSolver:
         return out
 
     def _refusal(self, q: Sequence[float]) -> JointVectorError:
-        n = len(self._steps)
-        if len(q) != n:
-            return JointVectorError(f'joint vector: found {len(q)} values, allowed: {n}')
-        bad = [i for i, value in enumerate(q)
-               if not isinstance(value, (int, float)) or not -_INF < value < _INF]
-        if not bad:
-            return JointVectorError(_TOO_LARGE)
-        where = ', '.join(f'q[{i}] = {reprlib.repr(q[i])}' for i in bad)
-        return JointVectorError(f'joint vector: found {where}, allowed: finite numbers')
+        return fault_of(q, len(self._steps)) or JointVectorError(_TOO_LARGE)
+
+
+def fault_of(values: Sequence[float], n: int, kind: str = 'joint vector',
+             symbol: str = 'q') -> JointVectorError | None:
+    """Return the error for values that are not n finite numbers; None if they are."""
+    if len(values) != n:
+        return JointVectorError(f'{kind}: found {len(values)} values, allowed: {n}')
+    bad = [i for i, value in enumerate(values)
+           if not isinstance(value, (int, float)) or not -_INF < value < _INF]
+    if not bad:
+        return None
+    where = ', '.join(f'{symbol}[{i}] = {reprlib.repr(values[i])}' for i in bad)
+    return JointVectorError(f'{kind}: found {where}, allowed: finite numbers')
 
 
 def cos_sin_many(theta: Array, libm: bool = True) -> tuple[Array, Array]:

@@ -18,7 +18,7 @@ from typing import Any, cast
 from icub_leg_fk.errors import JointVectorError
 from icub_leg_fk.kinematics.link import DHLink
 from icub_leg_fk.kinematics.rotation import Array
-from icub_leg_fk.kinematics.solver import BLOCK, cos_sin_many, Scalars
+from icub_leg_fk.kinematics.solver import BLOCK, cos_sin_many, fault_of, Scalars
 from icub_leg_fk.kinematics.walk import Step, walk_to_root
 import numpy as np
 
@@ -50,14 +50,13 @@ class TwistSolver:
         """
         n = len(self._rows)
         if len(q) != n or len(qdot) != n:
-            raise JointVectorError(f'joint vector and velocity: found {len(q)} and {len(qdot)} '
-                                   f'values, allowed: {n} of each')
+            raise self._refusal(q, qdot)
         try:
             twist = cast(Twist, self._walk(reversed(q), reversed(qdot), _cos_sin))
         except (ArithmeticError, TypeError, ValueError) as error:
-            raise _not_finite() from error
+            raise self._refusal(q, qdot) from error
         if not all(map(math.isfinite, twist)):
-            raise _not_finite()
+            raise self._refusal(q, qdot)
         return twist
 
     def twists(self, Q: Array, Qdot: Array) -> Array:
@@ -82,7 +81,8 @@ class TwistSolver:
                 for column, values in zip(out[rows].T, twists, strict=True):
                     column[:] = values
         if not np.isfinite(out).all():
-            raise _not_finite()
+            row = int(np.argwhere(~np.isfinite(out))[0, 0])
+            raise self._refusal(Q[row].tolist(), Qdot[row].tolist())
         return out
 
     def _walk(self, q: Iterable[Scalars], qdot: Iterable[Scalars],
@@ -119,11 +119,12 @@ class TwistSolver:
         return (0.0 + (c * vx - s * vy), 0.0 + (s * vx + c * vy), 0.0 + vz,
                 0.0 + (c * wx - s * wy), 0.0 + (s * wx + c * wy), 0.0 + wz)
 
+    def _refusal(self, q: Sequence[float], qdot: Sequence[float]) -> JointVectorError:
+        n = len(self._rows)
+        return fault_of(q, n) or fault_of(qdot, n, 'joint velocities', 'qdot') or JointVectorError(
+            'joint vector and velocities: found values too large to compute with, allowed: finite '
+            'numbers')
+
 
 def _cos_sin(theta: float) -> tuple[float, float]:
     return math.cos(theta), math.sin(theta)
-
-
-def _not_finite() -> JointVectorError:
-    return JointVectorError('joint vector and velocity: found a value that is no finite number or '
-                            'too large to compute with')
