@@ -1,12 +1,23 @@
 """`leg_fk bag` on unfinished and damaged bags: what can be read is there, the rest is told."""
 
+from contextlib import closing
 import os
 import random
 import shutil
 import sqlite3
 import struct
 
-from bag_files import entries, LEFT_POSE, poses_of, read_bag, walk, write_bag
+from bag_files import (
+    entries,
+    joint_state,
+    LEFT_POSE,
+    poses_of,
+    read_bag,
+    SECOND,
+    START,
+    walk,
+    write_bag,
+)
 from icub_leg_fk.tools.bags import mcap_large
 from icub_leg_fk.tools.bags import mcap_records as mcap
 from icub_leg_fk.tools.leg_fk import main
@@ -260,11 +271,67 @@ def test_a_recorder_that_was_killed_leaves_its_write_ahead_log(tmp_path):
     shutil.copytree(tmp_path / 'in', tmp_path / 'killed')
     database.close()
     assert (tmp_path / 'killed' / 'in.db3-wal').stat().st_size
-    content = (tmp_path / 'killed' / 'in.db3').read_bytes()
+    (tmp_path / 'killed' / 'in.db3-shm').unlink()
+    content = {file: file.read_bytes() for file in (tmp_path / 'killed').iterdir()}
     done = leg_fk('bag', tmp_path / 'killed', tmp_path / 'out')
     assert done.returncode == 0, done
     assert len(messages_of(tmp_path / 'out')[0]) == 2 * len(messages)
-    assert (tmp_path / 'killed' / 'in.db3').read_bytes() == content
+    assert {file: file.read_bytes() for file in (tmp_path / 'killed').iterdir()} == content
+
+
+@pytest.mark.parametrize(('statement', 'status', 'told'), [
+    ("UPDATE messages SET timestamp = 'abc' WHERE id = 5", 1, '1 messages have no topic, no time'),
+    ('UPDATE messages SET timestamp = 1700000000.5 WHERE id = 5', 1, '1 messages have no topic'),
+    ("UPDATE messages SET data = 'abc' WHERE id = 5", 1, '1 messages have no topic, no time'),
+    ("UPDATE messages SET topic_id = 'x' WHERE id = 5", 1, '1 messages have no topic, no time'),
+    ("UPDATE topics SET offered_qos_profiles = x'ff00'", 0, ''),
+    ("UPDATE topics SET offered_qos_profiles = '- history: 1\n  depth: .inf\n'", 0, ''),
+    ('UPDATE topics SET type_description_hash = 5', 0, ''),
+    ("INSERT INTO topics VALUES (9, x'ff', 'a/msg/B', 'cdr', '', '')", 0, ''),
+    ("UPDATE message_definitions SET encoded_message_definition = x'00ff'", 0, ''),
+    ('CREATE TABLE t AS SELECT * FROM topics; DROP TABLE topics; ALTER TABLE t RENAME TO topics; '
+     "INSERT INTO topics VALUES (9, NULL, 'a/msg/B', 'cdr', NULL, '')", 0, ''),
+])
+def test_values_of_a_wrong_type_cost_no_more_than_themselves(tmp_path, statement, status, told):
+    file, messages = sqlite_bag(tmp_path, 30)
+    with closing(sqlite3.connect(file)) as database:
+        database.executescript(statement)
+    for storage in ('sqlite3', 'mcap'):
+        out = tmp_path / storage
+        done = leg_fk('bag', tmp_path / 'in', out, '--storage', storage)
+        assert (done.returncode, done.stderr) == (status, ''), done
+        assert told in done.stdout
+        found = len(list(out.iterdir())), done.stdout.split('\n')[1].split()
+        assert found == (2, [str(len(messages) - status), 'messages', 'copied'])
+
+
+def test_a_time_that_no_stamp_can_hold_gives_no_pose_and_is_copied(tmp_path):
+    late = 5_000_000_000 * SECOND  # in 2128
+    joints = [(late + i, joint_state(None if i % 2 else START)) for i in range(10)]
+    write_bag(tmp_path / 'in', joints=joints, others=False)
+    done = leg_fk('bag', tmp_path / 'in', tmp_path / 'out')
+    assert (done.returncode, done.stderr) == (0, ''), done
+    assert '5  joint states rejected: malformed' in done.stdout
+    found, poses = messages_of(tmp_path / 'out')
+    assert (len(found), poses) == (10, 5)
+
+
+def flipped(tmp_path, compression, at):
+    """Return a bag of two compressed chunks with one bit of the first one's header flipped."""
+    write_bag(tmp_path / 'in', joints=walk(2500), compression='storage')
+    file = tmp_path / 'in' / 'in.mcap'
+    data = bytearray(file.read_bytes())
+    data[data.index(compression) + at] ^= 1
+    file.write_bytes(data)
+    return file
+
+
+def test_a_compression_with_a_misprint_is_not_passed_on(tmp_path):
+    done = leg_fk('bag', flipped(tmp_path, b'zstd', 3), tmp_path / 'out')
+    assert done.returncode == 1, done
+    assert "unknown compression 'zste'" in done.stdout
+    found, poses = messages_of(tmp_path / 'out')
+    assert len(found) > 2000 and poses > 1000
 
 
 def test_old_sqlite_bags_without_definitions_are_copied_as_they_are(tmp_path):

@@ -55,11 +55,11 @@ def recording(count, text='x', every=10):
             yield '/text', time + 10, string(text)
 
 
-def copied(source, target, *words):
+def copied(source, target, *words, status=0):
     """Convert a bag, check that it needs little memory, and return what it printed."""
     done = subprocess.run([sys.executable, '-c', WITH_PEAK, 'bag', source, target, *words],
                           capture_output=True, text=True, timeout=120)
-    assert done.returncode == 0, done
+    assert done.returncode == status, done
     assert int(done.stderr) / 1000 < LARGEST, done
     return done.stdout
 
@@ -117,6 +117,26 @@ def test_a_cut_off_huge_chunk_that_holds_more_than_it_says_is_refused(tmp_path, 
     file.write_bytes(data[:9 * len(data) // 10])
     done = leg_fk('bag', file, tmp_path / 'out.mcap')
     assert_one_line_complaint(done, 'nothing can be read')  # for its topics were in that chunk
+
+
+@pytest.mark.parametrize(('compression', 'library'), [('zstd', 'zstandard'), ('lz4', 'lz4.frame')])
+def test_a_small_chunk_that_holds_a_gigabyte_is_refused_in_little_memory(tmp_path, compression,
+                                                                         library):
+    compress = pytest.importorskip(library).compress
+    write_mcap(tmp_path / 'in.mcap', recording(10), MB, compression)
+    file = tmp_path / 'in.mcap'
+    data = bytearray(file.read_bytes())
+    chunk = data.index(b'\x06', 8 + 9 + struct.unpack_from('<Q', data, 9)[0])
+    head = data[chunk + 9:chunk + 9 + 32 + len(compression)]  # up to the size of the data
+    struct.pack_into('<Q', head, 16, 1000)
+    bomb = compress(bytes(1 << 30))
+    assert len(bomb) < 5 * MB
+    record = head + struct.pack('<Q', len(bomb)) + bomb
+    file.write_bytes(data[:chunk] + b'\x06' + struct.pack('<Q', len(record)) + record
+                     + data[chunk:])
+    told = copied(file, tmp_path / 'out.mcap', status=1)
+    assert f'{compression} data of more than 1000 bytes' in told
+    assert read_bag_count(tmp_path / 'out.mcap') == 10 + 1 + 20
 
 
 def read_bag_count(path):

@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 import pty
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -142,10 +143,32 @@ def test_force_replaces_nothing_but_bags(tmp_path):
     (tmp_path / 'notes.txt').write_text('notes')
     (tmp_path / 'empty').mkdir()
     (tmp_path / 'link').symlink_to(precious)
-    for name in ('precious', 'notes.txt', 'empty', 'link'):
+    shelf = tmp_path / 'shelf'  # two recordings, each in its folder or file
+    shutil.copytree(source, shelf / 'monday.mcap')
+    shutil.copyfile(source / 'in.mcap', shelf / 'tuesday.mcap')
+    annotated = shutil.copytree(source, tmp_path / 'annotated')
+    (annotated / 'in.mcap.notes.txt').write_text('notes')
+    joined = shutil.copytree(source, tmp_path / 'joined')
+    shutil.copyfile(source / 'in.mcap', joined / 'another.mcap')
+    linked = shutil.copytree(source, tmp_path / 'linked')
+    (linked / 'in.mcap').rename(tmp_path / 'elsewhere.mcap')
+    (linked / 'in.mcap').symlink_to(tmp_path / 'elsewhere.mcap')
+    before = sorted(tmp_path.rglob('*'))
+    for name in ('precious', 'notes.txt', 'empty', 'link', 'shelf', 'annotated', 'joined',
+                 'linked'):
         assert_one_line_complaint(leg_fk('bag', source, tmp_path / name, '--force'),
                                   'exists and is no bag')
+    assert sorted(tmp_path.rglob('*')) == before
     assert (precious / 'walk.mcap').read_text() == 'a bag'
+
+
+def test_works_where_nobody_listens(tmp_path):
+    """A service manager may have closed what the command would speak through."""
+    source = write_bag(tmp_path / 'in', joints=walk(5))
+    done = subprocess.run(['sh', '-c', 'exec "$@" >&- 2>&-', 'sh', *COMMAND, 'bag', source,
+                           tmp_path / 'out'], timeout=DEADLINE)
+    assert done.returncode == 0
+    assert len(read_bag(tmp_path / 'out')[1]) == 5 + 2 + 10
 
 
 def test_the_input_is_never_the_output(tmp_path):

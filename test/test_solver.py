@@ -214,5 +214,5 @@ def test_numpy_and_integer_joint_vectors_are_welcome() -> None:
     lambda: DHLink(0, 0, 0, lower=1, upper=-1),
 ])
 def test_a_chain_that_cannot_be_is_refused(mistake: object) -> None:
-    with pytest.raises(LegFKError, match='found .*allowed: .'):
+    with pytest.raises(LegFKError, match=r'found .*allowed: .'):
         mistake()  # type: ignore[operator]

@@ -26,6 +26,7 @@ from icub_leg_fk.ros.joint_vector import are_usable, LARGEST_VALUE
 _REMEMBERED_LAYOUTS = 8
 _LARGEST_REMEMBERED = 65536  # bytes of a message; what a stranger sends may be larger
 _LARGEST = math.nextafter(LARGEST_VALUE, 0.0)
+_LAST_SECOND = (1 << 31) - 1  # that a stamp can hold
 _FIRST = 3  # fields before the joints: encapsulation, sec, nanosec
 
 Fields = tuple[Any, ...]
@@ -207,6 +208,10 @@ class JointStream:
         sec, nanosec = message.sec, message.nanosec
         if sec == 0 and nanosec == 0:
             sec, nanosec = divmod(self._now(), 1_000_000_000)
+            if sec > _LAST_SECOND:  # a bag may say it was recorded then
+                joint_input.reject_malformed(MalformedMessageError(
+                    f'stamp: found none at {sec} s, allowed: up to {_LAST_SECOND} s'))
+                return
         vectors = joint_input.update(sec * 1_000_000_000 + nanosec, message.names,
                                      message.positions, message.velocities)
         self._newest = joint_input.newest

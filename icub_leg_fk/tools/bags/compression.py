@@ -9,29 +9,33 @@ from typing import Any
 
 from icub_leg_fk.errors import MissingDependencyError
 
+COMPRESSIONS = ('', 'lz4', 'zstd')
 ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'
 _PIECE = 1 << 16
-_PORTION = 1 << 11
+_PORTION = 1 << 10
 
 
-def decompress(compression: str, data: bytes) -> bytes:
+def decompress(compression: str, data: bytes, limit: int) -> bytes:
     """Return data decompressed, as far as it goes.
 
     Args:
         compression: `zstd`, `lz4` or nothing.
         data: one compressed frame, maybe cut off.
+        limit: how many bytes it may become; a frame of some kilobytes may hold a gigabyte.
 
     Raises:
-        ValueError: the data is damaged, or the compression unknown.
+        ValueError: the data is damaged, becomes more than that, or the compression is unknown.
         MissingDependencyError: no library for it is installed.
     """
     if not compression:
         return data
-    decompressor, errors = _decompressor(compression)
-    try:
-        return bytes(decompressor.decompress(data))
-    except errors as error:
-        raise ValueError(f'damaged {compression} data') from error
+    pieces, size = [], 0
+    for piece in decompress_pieces(compression, [data]):
+        size += len(piece)
+        if size > limit:
+            raise ValueError(f'{compression} data of more than {limit} bytes')
+        pieces.append(piece)
+    return b''.join(pieces)
 
 
 def decompress_pieces(compression: str, pieces: Iterable[bytes]) -> Iterator[bytes]:
@@ -65,7 +69,13 @@ def compressor(compression: str) -> Callable[[bytes], bytes]:
 
     Args:
         compression: `zstd`, `lz4` or nothing.
+
+    Raises:
+        ValueError: the compression is unknown.
+        MissingDependencyError: no library for it is installed.
     """
+    if compression not in COMPRESSIONS:
+        raise ValueError(f'unknown compression {compression!r}')
     if not compression:
         return bytes
     if compression == 'lz4':

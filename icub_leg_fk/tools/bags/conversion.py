@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 import math
 import os
@@ -14,7 +14,7 @@ import time
 from icub_leg_fk.errors import InputFileError, OutputFileError
 from icub_leg_fk.ros.configuration import Configuration
 from icub_leg_fk.tools.bags.mcap_writer import McapWriter
-from icub_leg_fk.tools.bags.metadata import as_yaml, describe, metadata_file_text
+from icub_leg_fk.tools.bags.metadata import as_yaml, describe, METADATA, metadata_file_text
 from icub_leg_fk.tools.bags.output import output_place
 from icub_leg_fk.tools.bags.poses import pose_topics, PoseAdder
 from icub_leg_fk.tools.bags.reader import BagReader, KINDS
@@ -95,21 +95,18 @@ def convert(source: Path, target: Path, conversion: Conversion,
         job = _Job(bag, conversion)
         storage = _storage(target, conversion.storage) or bag.storage
         file = _storage_file(place.bag, storage)
-        writer = _writer(storage, file, job.topics, bag.compression)
         try:
-            for block in job.blocks(on_progress):
-                writer.write(block)
-            writer.flush()
-            description = describe(storage, file.name, job.topics, writer.counts, writer.start,
-                                   writer.end, bag.custom_data)
-            writer.close(as_yaml(description))
+            with _writer(storage, file, job.topics, bag.compression) as writer:
+                for block in job.blocks(on_progress):
+                    writer.write(block)
+                writer.flush()
+                description = describe(storage, file.name, job.topics, writer.counts,
+                                       writer.start, writer.end, bag.custom_data)
+                writer.close(as_yaml(description))
         except sqlite3.Error as error:
             raise OutputFileError(f'{target}: cannot be written: {error}') from error
-        finally:
-            with suppress(OSError):  # what the disk had no room for is still pending
-                writer.abandon()
         if file != place.bag:
-            (place.bag / 'metadata.yaml').write_text(metadata_file_text(description))
+            (place.bag / METADATA).write_text(metadata_file_text(description))
         place.put()
     return job.summary(str(target), writer.counts, time.monotonic() - began)
 
@@ -229,8 +226,13 @@ def _storage_file(bag: Path, storage: str) -> Path:
     return bag / f'{bag.name}_0{ending}'
 
 
+@contextmanager
 def _writer(storage: str, file: Path, topics: Sequence[Topic],
-            compression: str) -> McapWriter | SqliteWriter:
-    if storage == 'mcap':
-        return McapWriter(file, topics, compression)
-    return SqliteWriter(file, topics)
+            compression: str) -> Iterator[McapWriter | SqliteWriter]:
+    writer = (McapWriter(file, topics, compression) if storage == 'mcap'
+              else SqliteWriter(file, topics))
+    try:
+        yield writer
+    finally:
+        with suppress(OSError):  # what the disk had no room for is still pending
+            writer.abandon()

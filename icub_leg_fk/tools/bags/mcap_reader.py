@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from icub_leg_fk.tools.bags import mcap_records as mcap
+from icub_leg_fk.tools.bags.compression import COMPRESSIONS
 from icub_leg_fk.tools.bags.mcap_large import is_large, message_spans, plain_file
 from icub_leg_fk.tools.bags.mcap_scan import McapScan, span_data
 from icub_leg_fk.tools.bags.time_queue import TimeQueue
@@ -39,7 +40,7 @@ class McapFile:
         path: the file.
         topics: its topics by channel.
         damage: what could not be read.
-        compression: compression of its first chunk.
+        compression: compression of its first chunk, of those that can be read.
         attachments: how many attachments it has; they are no messages, and not read.
         late: messages behind others that were recorded after them, too far off to be sorted.
         done: bytes read so far.
@@ -56,7 +57,8 @@ class McapFile:
             scan = McapScan(file, path.stat().st_size, scratch)
         self.topics, self.damage, self.attachments = scan.topics, scan.damage, scan.attachments
         self._spans = scan.spans
-        self.compression = min(self._spans).compression if self._spans else ''
+        self.compression = next((span.compression for span in sorted(self._spans)
+                                 if span.compression in COMPRESSIONS), '')
 
     def blocks(self, indices: Mapping[int, int]) -> Iterator[list[Message]]:
         """Yield the messages in order of their log time, some at a time.

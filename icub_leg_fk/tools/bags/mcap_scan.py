@@ -182,7 +182,7 @@ def span_data(file: BinaryIO, span: mcap.Span) -> bytes:
     """
     file.seek(span.offset)
     try:
-        data = decompress(span.compression, file.read(span.size))
+        data = decompress(span.compression, file.read(span.size), span.plain_size)
     except ValueError as error:
         raise ValueError(f'chunk at byte {span.offset}: {error}') from error
     if span.complete and span.plain_size and (

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from icub_leg_fk.tools.bags.topics import Topic
 import yaml
 
+METADATA = 'metadata.yaml'
 VERSION = 9
 ROS_DISTRO = 'jazzy'
 _HEADING = 'rosbag2_bagfile_information'
@@ -142,7 +143,8 @@ def _profiles(qos: str) -> list[dict[str, Any]]:
     """Return offered QoS profiles with the names of their policies; nothing if unreadable."""
     try:
         return [_profile(profile) for profile in yaml.safe_load(qos) or []]
-    except (yaml.YAMLError, KeyError, TypeError, ValueError, IndexError, RecursionError):
+    except (yaml.YAMLError, ArithmeticError, KeyError, TypeError, ValueError, IndexError,
+            RecursionError):
         return []
 
 

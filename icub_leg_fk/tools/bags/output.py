@@ -16,8 +16,10 @@ import shutil
 import signal
 
 from icub_leg_fk.errors import OutputFileError
+from icub_leg_fk.tools.bags.metadata import METADATA, read_metadata
 from icub_leg_fk.tools.bags.reader import KINDS
 
+_ENDINGS = ('', '-wal', '-shm', '-journal')  # of a storage file and of what sqlite adds
 _STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -79,7 +81,8 @@ class OutputPlace:
         if not self._replace:
             raise OutputFileError(f'{target}: exists already; --force replaces it')
         if not _is_bag(target):
-            raise OutputFileError(f'{target}: exists and is no bag; --force replaces only bags')
+            raise OutputFileError(f'{target}: exists and is no bag, or more than one; '
+                                  '--force replaces one bag, with its metadata.yaml')
 
     def _locked(self) -> int:
         """Make the hidden directory and return the descriptor that locks it."""
@@ -124,9 +127,13 @@ def _is_bag(path: Path) -> bool:
         return False
     if path.is_file():
         return path.suffix in KINDS
-    names = [entry.name for entry in path.iterdir()]
-    storage = [name for name in names if any(ending in name for ending in KINDS)]
-    return bool(storage) and set(names) <= {*storage, 'metadata.yaml'}
+    try:
+        files = read_metadata(path / METADATA).files or ()
+    except (ValueError, OSError):
+        return False
+    known = {METADATA, *(f'{file}{ending}' for file in files for ending in _ENDINGS)}
+    return all(entry.name in known and entry.is_file() and not entry.is_symlink()
+               for entry in path.iterdir())
 
 
 @contextmanager

@@ -12,13 +12,14 @@ from typing import NamedTuple
 from icub_leg_fk.errors import InputFileError
 from icub_leg_fk.tools.bags.compression import decompress, decompress_file, ZSTD_MAGIC
 from icub_leg_fk.tools.bags.mcap_reader import McapFile
-from icub_leg_fk.tools.bags.metadata import OldMetadata, read_metadata
+from icub_leg_fk.tools.bags.metadata import METADATA, OldMetadata, read_metadata
 from icub_leg_fk.tools.bags.sqlite_reader import SqliteFile, torn_bytes
 from icub_leg_fk.tools.bags.topics import Message, Topic
 
 KINDS: Mapping[str, str] = {'.mcap': 'mcap', '.db3': 'sqlite3'}
 """Storage by the ending of a file's name."""
 
+_LARGEST_MESSAGE = 1 << 28  # bytes, decompressed
 _ENDING = re.compile(r'(\.mcap|\.db3)(\.zstd)?$')
 
 
@@ -99,17 +100,18 @@ class BagReader:
                 self._clear_scratch()
             before += size
         if self._undecodable:
-            self.damage.append(f'{self._undecodable} messages have damaged zstd data')
+            self.damage.append(f'{self._undecodable} messages have zstd data that are damaged, or '
+                               f'become more than {_LARGEST_MESSAGE} bytes')
 
     def _read_metadata(self) -> OldMetadata:
-        file = self.path / 'metadata.yaml'
+        file = self.path / METADATA
         if self.path.is_dir():
             try:
                 return read_metadata(file)
             except FileNotFoundError:
-                self.damage.append('metadata.yaml is missing')
+                self.damage.append(f'{METADATA} is missing')
             except (ValueError, OSError) as error:
-                self.damage.append(f'metadata.yaml cannot be read: {error}')
+                self.damage.append(f'{METADATA} cannot be read: {error}')
         elif not self.path.exists():
             raise InputFileError(f'{self.path}: there is no such bag')
         return OldMetadata()
@@ -173,21 +175,30 @@ class BagReader:
                                                   definition=like.definition))
 
     def _plain(self, path: Path, compressed: bool, damage: list[str]) -> Path:
-        """Return a file to read: decompressed, and without a torn page at its end."""
+        """Return a file to read: decompressed, and such that reading leaves the bag as it is."""
         plain = path
         if compressed:
             plain = self._scratch / path.stem
             self._made.append(plain)
             if problem := decompress_file(path, plain):
                 damage.append(problem)
-        if plain.suffix == '.db3' and (torn := torn_bytes(plain)):
-            damage.append('is cut off')
-            whole = self._scratch / f'whole_{plain.name}'
-            self._made.append(whole)
-            shutil.copyfile(plain, whole)
-            os.truncate(whole, plain.stat().st_size - torn)
-            plain = whole
+        if plain.suffix == '.db3':
+            torn, log = torn_bytes(plain), Path(f'{plain}-wal')
+            if torn or (log.exists() and log.stat().st_size):
+                plain = self._copy_to_scratch(plain, log, torn)
+            if torn:
+                damage.append('is cut off')
         return plain
+
+    def _copy_to_scratch(self, file: Path, log: Path, torn: int) -> Path:
+        """Return a copy without a torn page, with the write-ahead log, which reading changes."""
+        copy = self._scratch / f'copy_{file.name}'
+        self._made += [copy, *(Path(f'{copy}{ending}') for ending in ('-wal', '-shm'))]
+        shutil.copyfile(file, copy)
+        os.truncate(copy, file.stat().st_size - torn)
+        if log.exists():
+            shutil.copyfile(log, f'{copy}-wal')
+        return copy
 
     def _clear_scratch(self) -> None:
         while self._made:
@@ -202,7 +213,7 @@ class BagReader:
             *others, data = message
             if data.startswith(ZSTD_MAGIC):
                 try:
-                    data = decompress('zstd', data)
+                    data = decompress('zstd', data, _LARGEST_MESSAGE)
                 except ValueError:
                     self._undecodable += 1
                     continue

@@ -23,7 +23,7 @@ class ProgressBar:
 
     def __init__(self) -> None:
         self.span = (0.0, 1.0)
-        self._terminal = sys.stderr.isatty()
+        self._terminal = sys.stderr is not None and sys.stderr.isatty()
         self._began = self._shown = time.monotonic()
         self._visible = False
 

@@ -90,7 +90,8 @@ class SqliteFile:
                     'FROM message_definitions')}
             for number, *fields in database.execute(
                     f'SELECT id, {columns} FROM topics ORDER BY id'):
-                self.topics[number] = Topic(*fields, *definitions.get(fields[1], ('', '')))
+                self.topics[number] = Topic(*map(_text, (
+                    *fields, *definitions.get(fields[1], ('', '')))))
 
     def _blocks(self, database: sqlite3.Connection,
                 indices: Mapping[int, int]) -> Iterator[list[Message]]:
@@ -101,10 +102,11 @@ class SqliteFile:
         while leap < _TOO_FAR:
             try:
                 for topic, time, number, data in database.execute(query, place):
-                    place, leap = {'time': time, 'number': number}, 0
-                    if type(data) is not bytes or topic not in self.topics:
+                    if (type(data) is not bytes or type(time) is not int
+                            or topic not in self.topics):
                         odd += 1
                         continue
+                    place, leap = {'time': time, 'number': number}, 0
                     size += len(data)
                     if topic in indices:
                         block.append((indices[topic], 0, time, time, data))
@@ -128,7 +130,7 @@ class SqliteFile:
                     place = {'time': time + leap, 'number': -1}
         self.done += size
         if odd:
-            self.damage.append(f'{odd} messages have no topic or no data')
+            self.damage.append(f'{odd} messages have no topic, no time or no data')
         if block:
             yield block
 
@@ -144,6 +146,13 @@ def torn_bytes(path: Path) -> int:
     if page_size == 1:  # as the file format puts it
         page_size = 65536
     return path.stat().st_size % page_size if header.startswith(_MAGIC) and page_size else 0
+
+
+def _text(value: object) -> str:
+    """Return a value of a text column, in which sqlite holds anything, as text."""
+    if isinstance(value, bytes):
+        return value.decode('utf-8', 'replace')
+    return '' if value is None else str(value)
 
 
 def _first_time(database: sqlite3.Connection) -> int:
