@@ -206,14 +206,17 @@ def test_twists_are_those_of_the_moving_feet(tmp_path):
 
 
 def test_no_velocities_give_no_twist_and_are_counted(tmp_path):
-    joints = [(START + i, joint_state(START + i, velocities=[0.1] * 12 if i % 2 else []))
+    unknown = [0.1] * 3 + [float('nan')] + [0.1] * 8
+    joints = [(START + i, joint_state(START + i, velocities=[0.1] * 12 if i % 2 else unknown))
               for i in range(10)]
     write_bag(tmp_path / 'in', joints=joints, others=False)
     out = bag(tmp_path / 'in', tmp_path / 'out', '--twist')
     order = order_of(tmp_path / 'out')
     assert order.count('/foot_pose_publisher/left_foot/twist') == 5
+    assert order.count('/foot_pose_publisher/right_foot/twist') == 10
     assert order.count(LEFT_POSE) == 10
-    assert '5  joint states gave no twist of left_leg: no_velocity' in out
+    assert '5  joint states gave no twist of left_leg: no_velocity (l_knee unknown)' in out
+    assert 'twist of right_leg' not in out
 
 
 def test_tf_gets_the_same_transforms(tmp_path):

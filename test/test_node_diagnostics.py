@@ -86,10 +86,20 @@ def test_rejected_messages_are_a_warning_once_and_stay_counted(shared):
     send.stamp -= SECOND // 100
     status, values = robot.status(inbox, 'right_leg', level(WARN), meanwhile=send)
     for reason in REASONS:
-        assert reason in status.message
+        assert (reason in status.message) == (reason != 'empty_position')
         assert int(values[reason]) == before[reason] + 1
     status, later = robot.status(inbox, 'right_leg', level(OK), meanwhile=send)
     assert {later[reason] for reason in REASONS} == {values[reason] for reason in REASONS}
+
+
+def test_an_empty_position_is_counted_only(shared):
+    robot, inbox, send = shared
+    before = robot.status(inbox, 'right_leg', level(OK), meanwhile=send)[1]['empty_position']
+    send(BOTH, [])
+    status, _ = robot.status(
+        inbox, 'right_leg', lambda status, values: values['empty_position'] != before,
+        meanwhile=send)
+    assert (status.level, status.message) == (OK, 'poses go out')
 
 
 def test_stale_joint_is_named_in_a_warning_while_some_poses_go_out(shared):
@@ -139,9 +149,10 @@ def test_poses_without_velocity_are_counted_where_twists_are_wanted():
         send, inbox = Traffic(robot), robot.diagnostics()
         _, values = robot.status(inbox, 'left_leg', level(WARN), meanwhile=send)
         assert int(values['no_velocity']) > 0
+        assert values['no_velocity joints'] == ', '.join(f'{joint} unknown' for joint in LEFT)
         robot.status(inbox, 'left_leg', level(OK),
                      meanwhile=send.sender(BOTH, velocity=[0.1] * 12))
-        assert twists
+        robot.until(lambda: twists, 'twists')
 
 
 def test_once_a_second_though_simulated_time_stands_still():

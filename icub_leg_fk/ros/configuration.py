@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
-import math
 from typing import Any
 
 from icub_leg_fk.errors import LegFKError, ParameterError
@@ -13,6 +12,8 @@ from icub_leg_fk.kinematics import Catalog, Chain
 from icub_leg_fk.kinematics.catalog import FOOT_FRAMES
 
 STAMP_SOURCES = ('message', 'now')
+DEFAULT_TIMEOUT = 0.5  # s
+LONGEST_TIMEOUT = 1e6  # s
 
 
 @dataclass(frozen=True)
@@ -58,15 +59,15 @@ class Configuration:
         _check_choice('foot_frame', values['foot_frame'], FOOT_FRAMES)
         _check_choice('stamp_source', values['stamp_source'], STAMP_SOURCES)
         timeout, prefix = values['joint_timeout'], values['frame_prefix']
-        if not 0.0 <= timeout < math.inf:
+        if not 0.0 <= timeout <= LONGEST_TIMEOUT:
             raise ParameterError(f'parameter joint_timeout: found {timeout}, '
-                                 'allowed: seconds from 0 on, 0 is none')
+                                 f'allowed: 0 to {LONGEST_TIMEOUT:g} s, 0 is none')
         if not prefix.isprintable() or ' ' in prefix:
             raise ParameterError(f'parameter frame_prefix: found {prefix!r}, '
                                  'allowed: printable characters other than space')
         if values['publish_tf'] and find_spec('tf2_ros') is None:
-            raise ParameterError('parameter publish_tf: found true without the package tf2_ros, '
-                                 'allowed: false, or install tf2_ros')
+            raise ParameterError('parameter publish_tf: found true without the Python module '
+                                 'tf2_ros, allowed: false, or install tf2_ros_py')
         for name, entry in catalog.chains.items():
             if own := values.get(version_parameter(name)):
                 _check_choice(version_parameter(name), own, tuple(entry.versions))

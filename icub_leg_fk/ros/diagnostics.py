@@ -88,6 +88,8 @@ def _verdict(messages: int, rejected: Counter[str], counts: ChainCounts,
         return DiagnosticStatus.STALE, 'no JointState received'
     concerns = [f'{_WORDS[reason]}: {_listed(joints)}'
                 for reason, joints in sorted(counts.joints.items())]
+    if counts.ready:
+        rejected.pop('empty_position', None)  # is counted only, unless nothing else comes
     if rejected:
         concerns.append('messages: ' + ', '.join(
             f'{reason} {count}' for reason, count in sorted(rejected.items())))

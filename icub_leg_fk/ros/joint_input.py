@@ -142,10 +142,15 @@ class JointInput:
 
     def note_no_velocity(self, chain: int) -> None:
         """Count a joint vector whose velocities are wanted and unknown."""
+        joints = {
+            name: 'unknown' if math.isnan(self._velocities[slot]) else str(self._velocities[slot])
+            for name, slot in zip(self.chains[chain].joint_names, self._names.chain_slots[chain],
+                                  strict=True)
+            if not are_usable((self._velocities[slot],))}
         self.chain_counts[chain].held_back['no_velocity'] += 1
-        self.chain_counts[chain].blame('no_velocity', {'twist': 'not sent'})
-        self._report('no_velocity', f'{self.chains[chain].name}: no twist: velocity is absent, '
-                     'short or not finite')
+        self.chain_counts[chain].blame('no_velocity', joints)
+        self._report('no_velocity', f'{self.chains[chain].name}: no twist: velocity of '
+                     f'{", ".join(f"{name} {what}" for name, what in joints.items())}')
 
     def take_counts(self, chain: int) -> ChainCounts:
         """Return what has happened to a chain since this was last called."""

@@ -65,6 +65,9 @@ class Outputs:
         if configuration.publish_tf and self._broadcaster is None:
             from tf2_ros import TransformBroadcaster
             self._broadcaster = TransformBroadcaster(self._node)
+        elif not configuration.publish_tf and self._broadcaster is not None:
+            self._node.destroy_publisher(self._broadcaster.pub_tf)
+            self._broadcaster = None
         self._configuration = configuration
 
     def handlers(self) -> list[OnReady | None]:
@@ -150,9 +153,12 @@ class Outputs:
     def _tf_step(self, chain: Chain, configuration: Configuration) -> OnReady:
         prefix = configuration.frame_prefix
         send = self._broadcaster.sendTransform
+        subscribers = self._broadcaster.pub_tf.get_subscription_count
 
         def broadcast(sec: int, nanosec: int, q: Sequence[float],
                       qdot: Sequence[float] | None) -> None:
+            if subscribers() == 0:  # of this publisher the middleware tells nothing
+                return
             message = TransformStamped(child_frame_id=prefix + chain.tip_frame)
             message.header.frame_id = prefix + chain.root_frame
             message.header.stamp = Time(sec=sec, nanosec=nanosec)

@@ -8,7 +8,13 @@ from typing import Any, NamedTuple
 from icub_leg_fk.errors import LegFKError, ParameterError
 from icub_leg_fk.kinematics import Catalog
 from icub_leg_fk.kinematics.catalog import FOOT_FRAMES
-from icub_leg_fk.ros.configuration import Configuration, STAMP_SOURCES, version_parameter
+from icub_leg_fk.ros.configuration import (
+    Configuration,
+    DEFAULT_TIMEOUT,
+    LONGEST_TIMEOUT,
+    STAMP_SOURCES,
+    version_parameter,
+)
 from icub_leg_fk.ros.qos_overrides import check_qos_override, PREFIX
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -19,8 +25,6 @@ from rcl_interfaces.msg import (
 from rclpy.exceptions import ParameterException, ParameterUninitializedException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-
-_LONGEST_TIMEOUT = 1e6  # s
 
 
 class _Parameter(NamedTuple):
@@ -42,20 +46,20 @@ class _Parameter(NamedTuple):
 
 _PARAMETERS = (
     _Parameter('chains', ['left_leg', 'right_leg'], 'Chains whose tip poses are published.',
-               'names of chains in the kinematics file, each once'),
+               'a list of chains of the kinematics file, each once, such as [left_leg]'),
     _Parameter('version', 'v2_5', 'Version of every chain that sets none of its own.',
-               'a version in the kinematics file'),
+               'a version of the kinematics file, such as v2_5 (leg_fk list shows them)'),
     _Parameter('kinematics_file', '', 'Kinematics file to read; empty is the shipped one.',
                'path of a YAML file'),
     _Parameter('foot_frame', 'dh', "Axes of the tip: the table's last frame, or the sole.",
                ' or '.join(FOOT_FRAMES)),
     _Parameter('frame_prefix', '', 'Put before every frame id.', 'printable, no space'),
-    _Parameter('joint_timeout', 0.5, 'Age of a joint beside the newest of its chain above which '
-               'the chain is held back [s]; 0 turns this off.', '', _LONGEST_TIMEOUT),
+    _Parameter('joint_timeout', DEFAULT_TIMEOUT, 'Age of a joint beside the newest of its chain above which '
+               'the chain is held back [s]; 0 turns this off.', '', LONGEST_TIMEOUT),
     _Parameter('stamp_source', 'message', "Stamp of the poses: the message's, or the node's "
                "time; a zero message stamp always becomes the node's time.",
                ' or '.join(STAMP_SOURCES)),
-    _Parameter('publish_tf', False, 'Also broadcast the poses as transforms (needs tf2_ros).'),
+    _Parameter('publish_tf', False, 'Also broadcast the poses as transforms (needs tf2_ros_py).'),
     _Parameter('publish_twist', False, 'Also publish the velocity of the tips.'),
     _Parameter('publish_markers', False, 'Also publish the skeletons for RViz and Foxglove.'),
 )

@@ -146,7 +146,7 @@ def _configuration(args: argparse.Namespace) -> Configuration:
         configuration = Configuration.from_parameters(values, catalog)
     except LegFKError as error:
         raise LegFKError(_as_options(str(error))) from error
-    return replace(configuration, publish_tf=args.tf)  # here that needs no tf2_ros
+    return replace(configuration, publish_tf=args.tf)  # here that needs no broadcaster
 
 
 def _as_options(text: str) -> str:

@@ -9,6 +9,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from icub_leg_fk.errors import LegFKError
+from icub_leg_fk.tools.chain_arguments import DEFAULT_VERSION
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -38,8 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument('--recording', metavar='FILE', type=Path,
                         help='CSV file to play, in its own timing (default: a walking gait)')
-    parser.add_argument('--version', metavar='VERSION', default='v2_5',
-                        help='version of both legs (default: v2_5)')
+    parser.add_argument('--version', metavar='VERSION', default=DEFAULT_VERSION,
+                        help=f'version of both legs (default: {DEFAULT_VERSION})')
     parser.add_argument('--foot-frame', metavar='{dh,sole}', default='dh',
                         help="axes of the feet: the table's last frame (the default), or the sole")
     parser.add_argument('--seconds', metavar='S', type=_number(0.1, 3600),

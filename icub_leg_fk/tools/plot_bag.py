@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 
 from icub_leg_fk.errors import InputFileError
 from icub_leg_fk.kinematics import Chain
+from icub_leg_fk.ros.configuration import DEFAULT_TIMEOUT
 from icub_leg_fk.ros.joint_input import JointInput
 from icub_leg_fk.ros.joint_stream import JointStream, OnReady
 from icub_leg_fk.tools.bags.reader import BagReader
@@ -18,7 +19,6 @@ from icub_leg_fk.tools.recording import ChainTrack
 import numpy as np
 
 DEFAULT_TOPIC = '/joint_states'
-JOINT_TIMEOUT = 0.5  # s, the node's default
 
 
 @dataclass
@@ -72,7 +72,7 @@ def read_bag(path: Path, chains: Sequence[Chain], topic: str | None) -> BagTrack
         InputFileError: the bag cannot be read, has no such topic, or no chain has a pose.
     """
     clock, rows = _Clock(), [_Rows() for _ in chains]
-    stream = JointStream(JointInput(chains, JOINT_TIMEOUT), now=lambda: clock.now)
+    stream = JointStream(JointInput(chains, DEFAULT_TIMEOUT), now=lambda: clock.now)
     stream.on_ready = [row.handler() for row in rows]
     with TemporaryDirectory() as scratch:
         bag = BagReader(path, Path(scratch))

@@ -71,7 +71,8 @@ class PoseAdder:
         names = [topic.name for topic in topics]
         self._outputs = [_ChainOutput(chain, configuration, names)
                          for chain in configuration.chains]
-        self._stream.on_ready = [self._collector(output) for output in self._outputs]
+        self._stream.on_ready = [self._collector(index, output, configuration.publish_twist)
+                                 for index, output in enumerate(self._outputs)]
 
     def add(self, messages: Sequence[Message]) -> list[Message]:
         """Return a block of messages with its poses."""
@@ -83,19 +84,14 @@ class PoseAdder:
             if message[0] in joint_topics:
                 self._time = message[2]
                 feed(message[4])
-        gaps = 0
-        for index, output in enumerate(self._outputs):
-            missing = output.fill(block, self.added)
-            gaps += missing
-            for _ in range(missing):
-                self._stream.settle().note_no_velocity(index)
+        gaps = sum([output.fill(block, self.added) for output in self._outputs])
         return [message for message in block if message is not None] if gaps else block
 
     def settle(self) -> JointInput:
         """Return the rules' state, with all counts."""
         return self._stream.settle()
 
-    def _collector(self, output: _ChainOutput) -> OnReady:
+    def _collector(self, index: int, output: _ChainOutput, twist: bool) -> OnReady:
         places = (None,) * output.places
         ready = output.ready
 
@@ -104,6 +100,8 @@ class PoseAdder:
             block = self._block
             ready.append((len(block), self._time, sec, nanosec, q, qdot))
             block.extend(places)
+            if twist and qdot is None:
+                self._stream.settle().note_no_velocity(index)
         return collect
 
 
