@@ -27,7 +27,8 @@ def main() -> int:
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
 
     from bench.picture import draw
-    from bench.report import Report
+    from bench.report import make_room, Report
+    make_room(parser, args.json, args.picture)
     report = Report()
     if (load := os.getloadavg()[0]) > _QUIET_LOAD:
         report.note(f'this machine is busy (load {load:.1f}); expect wide spreads')

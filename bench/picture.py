@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 
 from bench.report import Report
+from icub_leg_fk.tools.output_file import whole_file
 
 _COLOURS = {'ours': '#1f6fb4', 'floor': '#8a8a8a', 'plain': '#c8553d'}
 _LABELS = {
@@ -63,6 +64,6 @@ def draw(report: Report, path: Path) -> None:
         axes.grid(alpha=0.25, linewidth=0.6)
         axes.legend(frameon=False, fontsize=8)
     fig.suptitle(report.machine, fontsize=8, color='#666666', x=0.01, ha='left')
-    path.parent.mkdir(parents=True, exist_ok=True)
-    fig.savefig(path, dpi=150)
+    with whole_file(path) as stream:
+        fig.savefig(stream, format='png', dpi=150)
     plt.close(fig)

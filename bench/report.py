@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from argparse import ArgumentParser
 from datetime import datetime, timezone
 import json
 import os
@@ -10,6 +11,7 @@ import platform
 from typing import Any
 
 from bench.measure import Figure
+from icub_leg_fk.tools.output_file import write_text
 
 
 class Report:
@@ -61,18 +63,26 @@ class Report:
 
     def write(self, path: Path) -> None:
         """Write everything as JSON."""
-        path.parent.mkdir(parents=True, exist_ok=True)
         growth = {panel: {curve: [{'x': x, **value._asdict()} for x, value in points]
                           for curve, points in curves.items()}
                   for panel, curves in self.growth.items()}
-        path.write_text(json.dumps({
+        write_text(path, json.dumps({
             'date': datetime.now(timezone.utc).isoformat(timespec='seconds'),
             'machine': self.machine, 'rows': self.rows, 'growth': growth,
-            'notes': self.notes}, indent=1) + '\n', encoding='utf-8')
+            'notes': self.notes}, indent=1) + '\n')
 
     def broken_promises(self) -> list[str]:
         """Return the names of the rows whose promise does not hold."""
         return [row['name'] for row in self.rows if row['holds'] is False]
+
+
+def make_room(parser: ArgumentParser, *files: Path) -> None:
+    """Make the directories of what is to be written, before any time is spent on it."""
+    try:
+        for file in files:
+            file.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        parser.error(f'{error.filename}: {error.strerror}')
 
 
 def machine() -> str:

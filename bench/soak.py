@@ -18,7 +18,8 @@ import time
 from typing import Any
 
 from bench.measure import cpu_ns, percentile, resident_bytes
-from bench.report import machine
+from bench.report import machine, make_room
+from icub_leg_fk.tools.output_file import write_text
 
 NAMESPACE = 'soak'
 WINDOW = 10.0  # s
@@ -38,6 +39,7 @@ def main() -> int:
     args = parser.parse_args()
     if not (args.minutes > 0 and 0 < args.rate <= 1e5 and args.every > 0):
         parser.error('found minutes, rate or every out of range, allowed: more than 0')
+    make_room(parser, args.json)
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
     with subprocess.Popen(_command()) as node:
@@ -48,8 +50,7 @@ def main() -> int:
         report['exit code'] = node.wait()
     failures = _failures(report)
     report['failures'] = failures
-    args.json.parent.mkdir(parents=True, exist_ok=True)
-    args.json.write_text(json.dumps(report, indent=1))
+    write_text(args.json, json.dumps(report, indent=1))
     _print(report)
     print(f'figures in {args.json}')
     print(f'not endured: {"; ".join(failures)}' if failures else 'endured')

@@ -38,6 +38,26 @@ every_chain = _each_of(CASES)
 one_chain_of_each_kind = _each_of([CASES[2], CASES[11], *CASES[12:]])
 
 
+LONG_ARM = """\
+units: {length: mm, angle: deg}
+chains:
+  arm:
+    tip: tip
+    root_frame: base
+    joints: [j0, j1, j2, j3, j4, j5, j6, j7, j8, j9, j10, j11, j12]
+    tip_frames: {dh: {frame: tip}}
+    versions:
+      v1:
+        T_Ro0: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+        links:
+          - {a: 0, d: 0, alpha: 90, offset: 0, type: prismatic}
+          - {a: 10, d: 0, alpha: 0, offset: 0}
+          - {a: 0, d: 0, alpha: 90, offset: 0}
+""" + 9 * '          - {a: 0, d: 0, alpha: 0, offset: 0, type: prismatic}\n' + (
+    '          - {a: 10, d: 0, alpha: 0, offset: 0}\n')
+"""More than ten joints, of which 1 and 2 turn about parallel axes, and 12 turns too."""
+
+
 def explain(*words):
     """Return what `leg_fk explain` prints."""
     with redirect_stdout(StringIO()) as output:

@@ -10,9 +10,11 @@ from explain_cases import (
     EXAMPLES,
     explain,
     in_metres,
+    LONG_ARM,
     one_chain_of_each_kind,
     positions,
 )
+from icub_leg_fk.kinematics import Catalog
 import numpy as np
 import pytest
 
@@ -33,6 +35,19 @@ def evaluator(e):
 def test_the_formula_gives_the_chains_pose_everywhere(words, chain):
     formula = evaluator(json.loads(explain(*words, '--symbolic', '--json')))
     for q in np.random.default_rng(5).uniform(-3, 3, (50, len(chain.links))):
+        in_mm = [1000 * x if link.is_prismatic else x
+                 for x, link in zip(q, chain.links, strict=True)]
+        assert np.abs(in_metres(formula(in_mm)) - chain.forward(q)).max() < 1e-12
+
+
+def test_the_sum_of_joints_1_and_2_is_not_joint_12(tmp_path):
+    file = tmp_path / 'long_arm.yaml'
+    file.write_text(LONG_ARM)
+    chain = Catalog.load(file).chain('arm', 'v1')
+    e = json.loads(explain('arm', '-k', file, '--version', 'v1', '--symbolic', '--json'))
+    assert {'c_1_2', 'c_12'} <= e['symbols'].keys()
+    formula = evaluator(e)
+    for q in np.random.default_rng(6).uniform(-3, 3, (20, 13)):
         in_mm = [1000 * x if link.is_prismatic else x
                  for x, link in zip(q, chain.links, strict=True)]
         assert np.abs(in_metres(formula(in_mm)) - chain.forward(q)).max() < 1e-12

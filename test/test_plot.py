@@ -10,7 +10,7 @@ import zlib
 from icub_leg_fk.kinematics import Catalog
 from icub_leg_fk.tools.gait import walk
 from icub_leg_fk.tools.leg_fk import main
-from icub_leg_fk.tools.plot import chosen_chains, telling_instants
+from icub_leg_fk.tools.plot import telling_instants
 from icub_leg_fk.tools.recording import ChainTrack
 import numpy as np
 import pytest
@@ -41,7 +41,7 @@ def walking_csv(tmp_path, monkeypatch, gait):
 
 @pytest.fixture
 def tracks(gait):
-    return [gait.track(chain) for chain in chosen_chains(Catalog.load(), None, None, 'dh')]
+    return [gait.track(Catalog.load().chain(name, 'v2_5')) for name in ('left_leg', 'right_leg')]
 
 
 def write_bag(path, messages, topic='/joint_states', storage='mcap', compression=None):
@@ -208,6 +208,15 @@ def test_any_chain_of_any_file_can_be_drawn(tmp_path, monkeypatch):
         [','.join(['time', *joints]), *(f'{t},0.1,0,{t / 10},0,0.2,0' for t in range(9))]))
     assert main(['plot', 'head.csv', '--chains', 'head_imu', '--version', 'v2']) == 0
     assert Path('head.png').stat().st_size > 10_000
+
+
+def test_chains_may_have_a_version_of_their_own(walking_csv):
+    joints = Catalog.load().entry('head_imu').joint_names
+    header, *rows = walking_csv.read_text().splitlines()
+    Path('all.csv').write_text('\n'.join(
+        [','.join([header, *joints]), *(f'{row},0.1,0,0,0,0.2,0' for row in rows)]))
+    assert main(['plot', 'all.csv', '--chains', 'left_leg', 'head_imu',
+                 '--chain-version', 'head_imu=v2']) == 0
 
 
 def test_one_row_is_enough(walking_csv):

@@ -201,9 +201,11 @@ def broken(tmp_path, old, new):
     (['head_imu'], 'known: v2'),
     (['--version', 'v9'], "no chain has version 'v9'"),
     (['--chain-version', 'head_imu'], 'CHAIN=VERSION'),
-    (['--chain-version', 'tail=v2'], "unknown chain: 'tail'"),
+    (['--chain-version', 'tail=v2'], 'found tail, allowed: left_leg, right_leg, head_imu'),
     (['left_leg', '--chain-version', 'head_imu=v2'], 'found head_imu, allowed: left_leg'),
     (['-k', 'no_such_file.yaml'], 'no_such_file.yaml'),
+    (['--name', 'a\x01b'], "--name: found 'a\\x01b', allowed: printable text"),
+    (['-o', '-1.urdf'], 'expected one argument'),
     (['left_leg', '-o', '/dev/null'], '/dev/null'),
     (['left_leg', '-o', '/no/such/folder/x.urdf'], 'No such file or directory'),
 ])

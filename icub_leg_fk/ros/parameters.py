@@ -54,8 +54,8 @@ _PARAMETERS = (
     _Parameter('foot_frame', 'dh', "Axes of the tip: the table's last frame, or the sole.",
                ' or '.join(FOOT_FRAMES)),
     _Parameter('frame_prefix', '', 'Put before every frame id.', 'printable, no space'),
-    _Parameter('joint_timeout', DEFAULT_TIMEOUT, 'Age of a joint beside the newest of its chain above which '
-               'the chain is held back [s]; 0 turns this off.', '', LONGEST_TIMEOUT),
+    _Parameter('joint_timeout', DEFAULT_TIMEOUT, 'Age of a joint beside the newest of its chain '
+               'above which the chain is held back [s]; 0 turns this off.', '', LONGEST_TIMEOUT),
     _Parameter('stamp_source', 'message', "Stamp of the poses: the message's, or the node's "
                "time; a zero message stamp always becomes the node's time.",
                ' or '.join(STAMP_SOURCES)),

@@ -10,7 +10,12 @@ import sys
 from typing import TYPE_CHECKING
 
 from icub_leg_fk.errors import LegFKError, OutputFileError
-from icub_leg_fk.tools.chain_arguments import add_kinematics_file, DEFAULT_VERSION
+from icub_leg_fk.tools.chain_arguments import (
+    add_chain_version,
+    add_kinematics_file,
+    DEFAULT_VERSION,
+    own_versions,
+)
 
 if TYPE_CHECKING:
     from icub_leg_fk.ros.configuration import Configuration
@@ -57,8 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='chains to add (default: left_leg right_leg)')
     parser.add_argument('--version', metavar='VERSION', default=DEFAULT_VERSION,
                         help=f'version of the chains (default: {DEFAULT_VERSION})')
-    parser.add_argument('--chain-version', metavar='CHAIN=VERSION', action='append', default=[],
-                        help='version of one chain; may stand several times')
+    add_chain_version(parser)
     parser.add_argument('--foot-frame', metavar='{dh,sole}', default='dh',
                         help="axes of the feet: the table's last frame (the default), or the sole")
     parser.add_argument('--frame-prefix', metavar='PREFIX', default='',
@@ -136,12 +140,8 @@ def _configuration(args: argparse.Namespace) -> Configuration:
         'frame_prefix': args.frame_prefix, 'joint_timeout': args.joint_timeout,
         'stamp_source': 'message', 'publish_tf': False, 'publish_twist': args.twist,
         'publish_markers': False}
-    for item in args.chain_version:
-        chain, equals, version = item.strip().partition('=')
-        if not equals or chain not in args.chains:
-            raise LegFKError(f'--chain-version: found {item.strip()!r}, allowed: CHAIN=VERSION '
-                             f'with a chain of {", ".join(args.chains)}')
-        values[version_parameter(chain)] = version
+    values |= {version_parameter(chain): version
+               for chain, version in own_versions(args, args.chains).items()}
     try:
         configuration = Configuration.from_parameters(values, catalog)
     except LegFKError as error:

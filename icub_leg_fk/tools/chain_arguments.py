@@ -41,6 +41,38 @@ def add_chain(parser: argparse.ArgumentParser) -> None:
     add_kinematics_file(parser)
 
 
+def add_chain_version(parser: argparse.ArgumentParser) -> None:
+    """Add `--chain-version`, which `own_versions` reads."""
+    parser.add_argument('--chain-version', metavar='CHAIN=VERSION', action='append', default=[],
+                        type=_chain_version, help='version of one chain; may stand several times')
+
+
+def own_versions(args: argparse.Namespace, chains: Sequence[str]) -> dict[str, str]:
+    """Return the versions given by `--chain-version`, by chain.
+
+    Args:
+        args: what has been parsed.
+        chains: the chains that may have one.
+
+    Raises:
+        LegFKError: another chain is named, or one twice.
+    """
+    versions: dict[str, str] = {}
+    for chain, version in args.chain_version:
+        if chain not in chains or chain in versions:
+            raise LegFKError(f'--chain-version: found {chain}{" again" * (chain in versions)}, '
+                             f'allowed: {", ".join(chains)}, each once')
+        versions[chain] = version
+    return versions
+
+
+def _chain_version(text: str) -> tuple[str, str]:
+    chain, _, version = text.strip().partition('=')
+    if not (chain and version):
+        raise argparse.ArgumentTypeError(f'found {text.strip()!r}, allowed: CHAIN=VERSION')
+    return chain, version
+
+
 def add_joint_positions(parser: argparse.ArgumentParser, *, required: bool) -> None:
     """Add `--degrees` and `--radians`, of which at most one may be given."""
     group = parser.add_mutually_exclusive_group(required=required)

@@ -54,13 +54,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Give the demonstration; return 1 if a pose is missing or the node failed."""
     from icub_leg_fk.kinematics import Catalog
-    from icub_leg_fk.tools.demonstration.node import (
-        exit_on_signals,
-        NodeError,
-        stay_on_this_machine,
-    )
+    from icub_leg_fk.tools.demonstration.node import NodeError, stay_on_this_machine
     from icub_leg_fk.tools.demonstration.replay import ReplayError
     from icub_leg_fk.tools.drawing.style import check_output
+    from icub_leg_fk.tools.signals import stop_on_signals
 
     check_output(args.output, force=True)
     catalog = Catalog.load()
@@ -70,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     print(f'iCub legs {args.version}: {len(recording.times)} JointState messages to '
           f'foot_pose_publisher, poses back over DDS\n'
           f'(this machine only, ROS_DOMAIN_ID {domain}, namespace {_namespace()})\n', flush=True)
-    with exit_on_signals():
+    with stop_on_signals():
         try:
             answers = _play(args, recording, chains)
         except (NodeError, ReplayError) as error:

@@ -13,7 +13,6 @@ from contextlib import suppress
 from importlib import import_module
 import io
 import os
-import re
 import sys
 from typing import Any, NoReturn
 
@@ -49,8 +48,6 @@ examples:
 INTERRUPTED = 128 + 2  # as a shell reports SIGINT
 PIPE_CLOSED = 128 + 13  # and SIGPIPE
 
-_NEGATIVE_NUMBER = re.compile(r'-\.?\d.*|-(inf|nan).*', re.IGNORECASE)
-
 
 class Parser(argparse.ArgumentParser):
     """An argument parser that takes every negative number and complains in one line."""
@@ -62,7 +59,7 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Parse the arguments; `-1e-3` is a value, which argparse alone takes for an option."""
         # A word that starts with a space is never an option, and float() ignores the space.
-        args = [f' {arg}' if _NEGATIVE_NUMBER.fullmatch(arg) else arg for arg in args or ()]
+        args = [f' {arg}' if _is_negative(arg) else arg for arg in args or ()]
         return super().parse_known_args(args, namespace)
 
     def error(self, message: str) -> NoReturn:
@@ -138,6 +135,14 @@ def _parser(words: Sequence[str]) -> Parser:
         module.add_arguments(subparser)
         subparser.set_defaults(run=module.run)
     return parser
+
+
+def _is_negative(word: str) -> bool:
+    """Return whether a word is a negative number, or a list of numbers that begins with one."""
+    try:
+        return word.startswith('-') and isinstance(float(word.partition(',')[0]), float)
+    except ValueError:
+        return False
 
 
 def _forget_output() -> None:

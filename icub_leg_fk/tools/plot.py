@@ -9,10 +9,15 @@ import sys
 from typing import TYPE_CHECKING
 
 from icub_leg_fk.errors import InputFileError, LegFKError
-from icub_leg_fk.tools.chain_arguments import add_kinematics_file, chosen_version
+from icub_leg_fk.tools.chain_arguments import (
+    add_chain_version,
+    add_kinematics_file,
+    chosen_version,
+    own_versions,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from icub_leg_fk.kinematics import Catalog, Chain
     from icub_leg_fk.tools.plot_bag import BagTracks
@@ -49,6 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='chains to draw (default: left_leg right_leg)')
     parser.add_argument('--version', metavar='VERSION',
                         help='version of the chains (default: v2_5, if they have it)')
+    add_chain_version(parser)
     parser.add_argument('--foot-frame', metavar='{dh,sole}', default='dh',
                         help="axes of the feet: the table's last frame (the default), or the sole "
                              '(x forward, y left, z up)')
@@ -73,7 +79,9 @@ def run(args: argparse.Namespace) -> int:
         raise InputFileError(f'{args.input}: found nothing of that name, allowed: a bag or a CSV '
                              'file')
     catalog = Catalog.load(args.kinematics_file)
-    chains = chosen_chains(catalog, args.chains, args.version, args.foot_frame)
+    names = args.chains or default_chains(catalog)
+    chains = chosen_chains(catalog, names, args.version, args.foot_frame,
+                           own_versions(args, names))
     roots = {chain.root_frame for chain in chains}
     if len(roots) > 1:
         raise LegFKError(f'--chains: found the root frames {", ".join(sorted(roots))}, allowed: '
@@ -93,16 +101,19 @@ def run(args: argparse.Namespace) -> int:
     return PARTLY_READ if found.damage else 0
 
 
-def chosen_chains(catalog: Catalog, names: Sequence[str] | None, version: str | None,
-                  foot_frame: str) -> list[Chain]:
-    """Return the chains asked for, or both legs, or else all that the catalog has.
+def default_chains(catalog: Catalog) -> list[str]:
+    """Return both legs, or else all chains that the catalog has."""
+    return [name for name in DEFAULT_CHAINS if name in catalog.chains] or [*catalog.chains]
+
+
+def chosen_chains(catalog: Catalog, names: Sequence[str], version: str | None, foot_frame: str,
+                  own: Mapping[str, str]) -> list[Chain]:
+    """Return the chains asked for, in their own version or the common one.
 
     Raises:
         UnknownNameError: no such chain, version or tip frame; lists the known ones.
     """
-    if names is None:
-        names = [name for name in DEFAULT_CHAINS if name in catalog.chains] or [*catalog.chains]
-    return [catalog.chain(name, chosen_version(catalog, name, version), foot_frame)
+    return [catalog.chain(name, chosen_version(catalog, name, own.get(name, version)), foot_frame)
             for name in dict.fromkeys(names)]
 
 

@@ -7,7 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from icub_leg_fk.errors import LegFKError
-from icub_leg_fk.tools.chain_arguments import add_kinematics_file, DEFAULT_VERSION
+from icub_leg_fk.tools.chain_arguments import (
+    add_chain_version,
+    add_kinematics_file,
+    DEFAULT_VERSION,
+    own_versions,
+)
 
 if TYPE_CHECKING:
     from icub_leg_fk.kinematics import Catalog
@@ -31,8 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='chains to write (default: all that have the version asked for)')
     parser.add_argument('--version', metavar='VERSION', default=DEFAULT_VERSION,
                         help='version of every chain that has none of its own (default: v2_5)')
-    parser.add_argument('--chain-version', metavar='CHAIN=VERSION', action='append', default=[],
-                        type=_chain_version, help="one chain's own version; may be repeated")
+    add_chain_version(parser)
     parser.add_argument('--name', help='name of the robot (default: icub, or that of your file)')
     parser.add_argument('-o', '--output', metavar='FILE',
                         help='file to write, or to replace (default: standard output)')
@@ -45,9 +49,10 @@ def run(args: argparse.Namespace) -> int:
     from icub_leg_fk.tools.urdf_model import urdf_text
 
     catalog = Catalog.load(args.kinematics_file)
-    own_versions = dict(args.chain_version)
-    selections = _selections(catalog, args.chains, args.version, own_versions)
+    selections = _selections(catalog, args)
     robot = args.name or ('icub' if args.kinematics_file is None else Path(catalog.file).stem)
+    if not robot.isprintable():
+        raise LegFKError(f'--name: found {robot!r}, allowed: printable text')
     text = urdf_text(robot, selections)
     if args.output:
         from icub_leg_fk.tools.output_file import write_text
@@ -57,29 +62,20 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _selections(catalog: Catalog, chains: list[str], version: str,
-                own_versions: dict[str, str]) -> list[Selection]:
+def _selections(catalog: Catalog, args: argparse.Namespace) -> list[Selection]:
     from icub_leg_fk.tools.urdf_model import Selection
 
-    for name in [*chains, *own_versions]:
+    for name in args.chains:
         catalog.entry(name)
-    names = list(dict.fromkeys(chains)) or [
+    versions = own_versions(args, args.chains or list(catalog.chains))
+    names = list(dict.fromkeys(args.chains)) or [
         name for name, entry in catalog.chains.items()
-        if name in own_versions or version in entry.versions]
+        if name in versions or args.version in entry.versions]
     if not names:
-        raise LegFKError(f'no chain has version {version!r}: give --version or --chain-version')
-    for name in own_versions:
-        if name not in names:
-            raise LegFKError(f'--chain-version: found {name}, allowed: {", ".join(names)}')
+        raise LegFKError(f'no chain has version {args.version!r}: give --version or '
+                         '--chain-version')
     selections = []
     for name in names:
-        chain = catalog.chain(name, own_versions.get(name, version))
+        chain = catalog.chain(name, versions.get(name, args.version))
         selections.append(Selection(catalog.entry(name), chain.version))
     return selections
-
-
-def _chain_version(text: str) -> tuple[str, str]:
-    chain, separator, version = text.partition('=')
-    if not (chain and separator and version):
-        raise argparse.ArgumentTypeError(f'found {text!r}, allowed: CHAIN=VERSION')
-    return chain, version

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from icub_leg_fk.errors import LegFKError
 from icub_leg_fk.tools.bags.conversion import Conversion, convert, OnProgress, Summary
-from icub_leg_fk.tools.bags.signals import stop_on_signals
+from icub_leg_fk.tools.signals import stop_on_signals
 
 _REPORT_PERIOD = 0.1  # s
 

@@ -11,7 +11,6 @@ import subprocess
 import sys
 import tempfile
 from types import TracebackType
-from typing import Any
 
 from icub_leg_fk.errors import LegFKError
 
@@ -32,21 +31,6 @@ def stay_on_this_machine() -> str:
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     os.environ.pop('ROS_STATIC_PEERS', None)
     return os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % _HIGHEST_DOMAIN))
-
-
-@contextmanager
-def exit_on_signals() -> Iterator[None]:
-    """While it lasts, SIGTERM and SIGHUP end the process in order, as Ctrl-C does."""
-    def leave(number: int, frame: Any) -> None:
-        raise SystemExit(128 + number)
-
-    before = {number: signal.signal(number, leave) for number in (signal.SIGTERM, signal.SIGHUP)
-              if signal.getsignal(number) != signal.SIG_IGN}  # as nohup wants it
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 @contextmanager

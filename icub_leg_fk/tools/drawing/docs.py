@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import argparse
 from pathlib import Path
-import sys
 from typing import TYPE_CHECKING
 
 from icub_leg_fk.kinematics import Catalog, Chain
@@ -12,7 +12,7 @@ from icub_leg_fk.tools.drawing import legs as legs
 from icub_leg_fk.tools.drawing.pictures import feet_figure, walk_figure
 from icub_leg_fk.tools.drawing.style import color_of, FAINT, save_picture
 from icub_leg_fk.tools.gait import PERIOD, walk
-from icub_leg_fk.tools.plot import chosen_chains, telling_instants
+from icub_leg_fk.tools.plot import telling_instants
 import numpy as np
 
 if TYPE_CHECKING:
@@ -67,9 +67,12 @@ def _draw_foot(view: legs.View, chain: Chain, axes: tuple[str, str, str]) -> Non
 
 def main() -> None:
     """Draw the pictures into the directory given."""
-    directory = Path(sys.argv[1])
+    parser = argparse.ArgumentParser(prog='python -m icub_leg_fk.tools.drawing.docs',
+                                     description="Draws the README's pictures anew.")
+    parser.add_argument('directory', metavar='DIRECTORY', type=Path)
+    directory = parser.parse_args().directory
     catalog = Catalog.load()
-    chains = chosen_chains(catalog, LEGS, VERSION, 'sole')
+    chains = [catalog.chain(name, VERSION, 'sole') for name in LEGS]
     tracks = [walk(catalog, VERSION, 5.0).track(chain) for chain in chains]
     paths = [track.poses for track in tracks]
     instants = [PERIOD + instant for instant in telling_instants(tracks)]

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-import os
 from pathlib import Path
-import tempfile
 from typing import TYPE_CHECKING
 
 from icub_leg_fk.errors import LegFKError, MissingDependencyError, OutputFileError
 from icub_leg_fk.kinematics import Chain
+from icub_leg_fk.tools.output_file import whole_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -94,24 +93,7 @@ def save_picture(draw: Callable[[], Figure], path: Path, dpi: int = 150) -> None
     # Without dates the same picture is the same file.
     metadata = {'svg': {'Date': None}, 'pdf': {'CreationDate': None}}.get(kind)
     try:
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f'.{path.name}.')
-    except OSError as error:
-        raise OutputFileError(f'{path}: {error.strerror}') from error
-    try:
-        with rc_context(_SETTINGS), os.fdopen(handle, 'wb') as stream:  # type: ignore[arg-type]
+        with whole_file(path) as stream, rc_context(_SETTINGS):  # type: ignore[arg-type]
             draw().savefig(stream, format=kind, dpi=dpi, metadata=metadata)
-        os.chmod(name, 0o666 & ~_umask())
-        os.replace(name, path)
-    except OSError as error:
-        raise OutputFileError(f'{path}: {error.strerror}') from error
     except ValueError as error:
         raise LegFKError(f'{path}: cannot be drawn: {error}') from error
-    finally:
-        Path(name).unlink(missing_ok=True)
-
-
-def _umask() -> int:
-    """Return the process's umask, which mkstemp ignores and which can only be read by setting."""
-    mask = os.umask(0o022)
-    os.umask(mask)
-    return mask

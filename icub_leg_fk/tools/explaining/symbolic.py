@@ -97,7 +97,7 @@ class Exact:
         if not joints:  # cos(100 deg) is not simple; the angle itself may be a symbol's
             joints, constant, cc, sc = [index for index, _ in angles], 0, 1, 0
         total = sum(angle for index, angle in angles if index in joints)
-        name = ('_' if max(joints) > 9 else '').join(map(str, joints))
+        name = ('_' if max(self._angles) > 9 else '').join(map(str, joints))  # c_12 or c_1_2
         c = self._define(f'c_{name}', sympy.cos(total, evaluate=False))
         s = self._define(f's_{name}', sympy.sin(total, evaluate=False))
         return c * cc - s * sc, s * cc + c * sc

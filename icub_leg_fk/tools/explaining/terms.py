@@ -1,7 +1,8 @@
 """Matrix entries as words: decimals of a float, textbook notation of a sympy expression.
 
-Factors stand in the order of the joints, `-0.9175 s_0 c_1 c_2`, which no printer of sympy gives,
-and fractions as decimals where those are as exact: -0.9175 is easier on the eye than -367/400.
+Factors stand in the order of the joints (of the first ten), `-0.9175 s_0 c_1 c_2`, which no
+printer of sympy gives, and fractions as decimals where those are as exact: -0.9175 is easier on
+the eye than -367/400.
 """
 
 from __future__ import annotations

@@ -10,9 +10,12 @@ from types import FrameType
 
 @contextmanager
 def stop_on_signals() -> Iterator[None]:
-    """Raise SystemExit on SIGTERM and SIGHUP, with the status that a shell reports for them."""
-    numbers = (signal.SIGTERM, signal.SIGHUP)
-    before = {number: signal.signal(number, _stop) for number in numbers}
+    """Raise SystemExit on SIGTERM and SIGHUP, with the status that a shell reports for them.
+
+    One that is ignored, as `nohup` wants it, stays so.
+    """
+    before = {number: signal.signal(number, _stop) for number in (signal.SIGTERM, signal.SIGHUP)
+              if signal.getsignal(number) != signal.SIG_IGN}
     try:
         yield
     finally:
