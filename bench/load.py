@@ -19,8 +19,8 @@ from bench.joint_messages import joint_names, joint_positions
 _STAMP = struct.Struct('<iI')
 _STAMP_AT = 4  # behind the CDR encapsulation
 _GAIT_MESSAGES = 100
-_QUIET = 0.5  # s without a message after which no more are waited for
-_MATCH_TIMEOUT = 15.0  # s
+_QUIET = 5.0  # s without a message after which no more are waited for
+_MATCH_TIMEOUT = 60.0  # s
 
 
 class Received(NamedTuple):
@@ -152,10 +152,10 @@ def observer(connection: Connection) -> None:
             TwistStamped if topic.endswith('/twist') else PoseStamped, topic,
             lambda data: arrived.append((time.time_ns(), data)), qos, raw=True)
 
-    def take(topic: str, count: int) -> Received:
+    def take(topic: str, count: int, quiet: float = _QUIET) -> Received:
         arrived = received[topic]
         seen, since = -1, time.monotonic()
-        while len(arrived) < count and time.monotonic() - since < _QUIET:
+        while len(arrived) < count and time.monotonic() - since < quiet:
             executor.spin_once(timeout_sec=0.02)
             if len(arrived) != seen:
                 seen, since = len(arrived), time.monotonic()

@@ -107,7 +107,7 @@ class Bench:
             raise RuntimeError(f'no node has subscribed to {node.joint_topic}')
         for _ in range(100):
             self._robot('send', node.joint_topic, 32, 100.0, _TRIES)
-            if all(self._observer('take', topic, _TRIES).stamps for topic in node.topics):
+            if all(self._observer('take', topic, _TRIES, 0.5).stamps for topic in node.topics):
                 return
         raise RuntimeError(f'nothing from {node.topics}')
 

@@ -187,10 +187,11 @@ def test_a_zero_stamp_differs_only_in_the_time_that_is_now(tmp_path):
     """In the node that is the present time, in the tool the time of recording."""
     with NodeProcess(LOSSLESS) as node, Exchange(node) as talk:
         talk.meet(START - 60 * SECOND)
-        before = len(talk.poses()['left_foot'])
+        before = {tip: len(poses) for tip, poses in talk.poses().items()}
         talk.send(joint_state(None))
-        talk._robot.until(lambda: all(len(poses) > before for poses in talk.poses().values()),
-                          'the answer to a zero stamp')
+        talk._robot.until(
+            lambda: all(len(poses) > before[tip] for tip, poses in talk.poses().items()),
+            'the answer to a zero stamp')
         by_node = talk.poses()
     by_tool, _ = poses_by_tool(tmp_path, talk.sent)
     for tip in FEET:

@@ -18,7 +18,8 @@ def bench(folder, *arguments):
     run = subprocess.run(
         [sys.executable, '-m', 'bench', *arguments, '--quick', '--json', str(folder / 'b.json'),
          '--picture', str(folder / 'b.png')], cwd=ROOT, capture_output=True, text=True)
-    assert run.returncode in (0, 1), run.stderr  # 1: a promise not kept, for so short a run
+    # 1: a promise not kept, for so short a run; or an exception
+    assert run.returncode in (0, 1) and 'Traceback' not in run.stderr, run.stderr
     return run.stdout, json.loads((folder / 'b.json').read_text(encoding='utf-8'))
 
 

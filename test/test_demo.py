@@ -56,7 +56,7 @@ def runs(pid):
         return False
 
 
-def wait_until(condition, timeout=30.0):
+def wait_until(condition, timeout=90.0):
     deadline = time.monotonic() + timeout
     while not (value := condition()):
         assert time.monotonic() < deadline
@@ -87,7 +87,10 @@ def test_without_a_terminal_there_is_a_plain_line_a_second():
     assert '\x1b' not in done.stdout
     lines = re.findall(r'^ +([\d.]+) s .*left foot: x \S+  y \S+  z \S+ m   right foot: x \S+',
                        done.stdout, re.MULTILINE)
-    assert [round(float(line)) for line in lines] == [1, 2, 2]  # and the last state
+    *each, last = map(float, lines)
+    assert last == 2.49  # and the last state
+    assert 1 <= len(each) <= 2
+    assert all(line >= second for second, line in enumerate(each, 1))  # late, if busy
 
 
 def test_talks_inside_the_machine_in_a_domain_and_namespace_of_its_own(monkeypatch):
@@ -109,7 +112,7 @@ def where_it_talks():
         if match := re.match(r'\(this machine only, ROS_DOMAIN_ID (\d+), namespace (\S+)\)', line):
             break
     process.send_signal(signal.SIGINT)
-    process.communicate(timeout=30)
+    process.communicate(timeout=90)
     return int(match[1]), match[2]
 
 
@@ -182,7 +185,7 @@ def test_nohup_is_respected():
                                stderr=subprocess.DEVNULL, text=True)
     read_until(process.stdout, 'right foot: ')
     process.send_signal(signal.SIGHUP)
-    process.communicate(timeout=30)
+    process.communicate(timeout=90)
     assert process.returncode == 0
 
 
@@ -198,7 +201,7 @@ def test_node_that_dies_is_one_line_and_exit_1():
     node, = wait_until(lambda: children(process.pid))
     read_until(process.stdout, 'right foot: x')
     os.kill(node, signal.SIGKILL)
-    _, err = process.communicate(timeout=30)
+    _, err = process.communicate(timeout=90)
     assert process.returncode == 1
     assert err.count('\n') == 1
     assert 'the node stopped with exit status -9' in err
@@ -221,10 +224,10 @@ def test_signals_leave_no_process_behind(number, status, early):
     if not early:
         read_until(process.stdout, 'right foot: x')
     process.send_signal(number)
-    _, err = process.communicate(timeout=30)
+    _, err = process.communicate(timeout=90)
     assert process.returncode == status
     assert err == ''
-    wait_until(lambda: not runs(node), timeout=1.0)
+    wait_until(lambda: not runs(node))
 
 
 def on_a_terminal(*words, **environment):
@@ -243,7 +246,7 @@ def on_a_terminal(*words, **environment):
             break
         written += data
     os.close(controller)
-    assert process.wait(30) == 0
+    assert process.wait(90) == 0
     return written.decode()
 
 

@@ -91,7 +91,7 @@ def test_no_joint_values_and_symbolic_without_values_are_the_same():
 def test_formulas_take_seconds_not_minutes():
     command = [sys.executable, '-m', 'icub_leg_fk.tools.leg_fk', 'explain']
     for chain in (['left_leg'], ['head_imu', '--version', 'v2']):
-        assert subprocess.run([*command, *chain], capture_output=True, timeout=20).returncode == 0
+        assert subprocess.run([*command, *chain], capture_output=True, timeout=60).returncode == 0
 
 
 def test_without_sympy_decimals_still_work_and_symbols_say_what_is_missing():

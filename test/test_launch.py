@@ -10,7 +10,7 @@ import pytest
 
 LAUNCH_FILE = Path(__file__).resolve().parents[1] / 'launch/foot_poses_launch.py'
 ARGUMENTS = {'version', 'chains', 'params_file', 'namespace', 'use_sim_time'}
-TIMEOUT = 30  # s
+TIMEOUT = 90  # s
 
 # What `ros2 launch FILE NAME:=VALUE ...` does, without ros2cli.
 ROS2_LAUNCH = f"""

@@ -5,7 +5,7 @@ import sys
 
 from geometry_msgs.msg import PoseStamped
 from icub_leg_fk.kinematics.catalog import config_file
-from node_harness import BOTH, DEEP, FEET, HEAD, LEFT, NodeProcess, RIGHT, Robot, SECOND
+from node_harness import BOTH, DEEP, FEET, HEAD, LEFT, LOSSLESS, NodeProcess, RIGHT, Robot, SECOND
 from node_oracle import assert_same_pose, oracle_pose
 import numpy as np
 import pytest
@@ -17,6 +17,14 @@ ANGLES = {name: 0.03 * (i + 1) * (-1) ** i for i, name in enumerate(BOTH)}
 
 @pytest.fixture(scope='module')
 def robot():
+    """Return a robot beside a node that loses nothing, however long it is held up."""
+    with NodeProcess(LOSSLESS) as node, Robot(node) as robot:
+        robot.connect()
+        yield robot
+
+
+@pytest.fixture(scope='module')
+def default_robot():
     """Return a robot beside a node with default parameters."""
     with NodeProcess(namespace='') as node, Robot(node) as robot:
         robot.connect()
@@ -87,7 +95,8 @@ def endpoints(robot, topic, kind):
             for info in found]
 
 
-def test_topics_have_the_types_and_qos_of_the_contract(robot):
+def test_topics_have_the_types_and_qos_of_the_contract(default_robot):
+    robot = default_robot
     volatile = DurabilityPolicy.VOLATILE
     assert endpoints(robot, '/joint_states', 'subscriptions') == [
         ('sensor_msgs/msg/JointState', ReliabilityPolicy.BEST_EFFORT, volatile)]
@@ -102,7 +111,8 @@ def test_topics_have_the_types_and_qos_of_the_contract(robot):
 
 
 @pytest.mark.parametrize('qos', [BEST_EFFORT, DEEP], ids=['best effort', 'reliable'])
-def test_publishers_of_either_reliability_are_heard(robot, qos):
+def test_publishers_of_either_reliability_are_heard(default_robot, qos):
+    robot = default_robot
     publisher = robot.node.create_publisher(JointState, 'joint_states', qos)
     stamp = robot.connect(publisher=publisher)
     assert stamp > 0
@@ -137,11 +147,13 @@ def test_qos_can_be_overridden_by_parameters_and_a_mismatch_is_said():
 
 
 def test_nodes_in_namespaces_work_side_by_side():
-    with NodeProcess({'version': 'v1'}) as red_node, Robot(red_node) as red, \
-            NodeProcess({'frame_prefix': 'blue/'}) as blue_node, Robot(blue_node) as blue:
+    parameters = {'version': 'v1', **LOSSLESS}, {'frame_prefix': 'blue/', **LOSSLESS}
+    with NodeProcess(parameters[0]) as red_node, Robot(red_node) as red, \
+            NodeProcess(parameters[1]) as blue_node, Robot(blue_node) as blue:
         for robot, version, frame in ((red, 'v1', 'root_link'), (blue, 'v2_5', 'blue/root_link')):
             stamp = robot.connect() + 1
             send_angles(robot, stamp, BOTH)
+            robot.wait_for(robot.left, stamp)
             pose = robot.take(robot.right, stamp)[-1]
             assert pose.header.frame_id == frame
             assert_same_pose(pose, expected('right_leg', RIGHT, version))
@@ -152,7 +164,8 @@ def test_topics_and_node_can_be_renamed_and_any_chain_chosen():
     arguments = ['-r', '__node:=feet', '-r', 'joint_states:=/yarp/state/joints',
                  '-r', '~/left_foot/pose:=/where/left']
     parameters = {'chains': ['head_imu', 'left_leg'], 'head_imu.version': 'v2',
-                  'left_leg.version': 'v1', 'foot_frame': 'sole'}
+                  'left_leg.version': 'v1', 'foot_frame': 'sole',
+                  'qos_overrides./yarp/state/joints.subscription.reliability': 'reliable'}
     with NodeProcess(parameters, arguments) as node, \
             Robot(node, tips=['head_imu'], name='feet') as robot:
         publisher = robot.node.create_publisher(JointState, '/yarp/state/joints', DEEP)
@@ -169,7 +182,8 @@ def test_topics_and_node_can_be_renamed_and_any_chain_chosen():
         assert 'head_imu has no sole' in node.log()
 
 
-def test_shipped_parameter_file_is_taken_and_holds_the_defaults(robot):
+def test_shipped_parameter_file_is_taken_and_holds_the_defaults(default_robot):
+    robot = default_robot
     file = str(config_file('foot_pose_publisher.yaml'))
     names = ['chains', 'version', 'left_leg.version', 'right_leg.version', 'kinematics_file',
              'foot_frame', 'frame_prefix', 'joint_timeout', 'stamp_source', 'publish_tf',

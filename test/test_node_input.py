@@ -1,6 +1,7 @@
 """What the node makes of the joint states that robots, and strangers, send."""
 
 import math
+import time
 
 from node_harness import BOTH, DEEP, HEAD, LEFT, LOSSLESS, NodeProcess, RIGHT, Robot, SECOND
 from node_oracle import assert_same_pose, oracle_pose
@@ -61,8 +62,7 @@ def test_parts_of_a_leg_combine_into_a_pose_for_every_message(robot):
 
 
 def test_torso_and_neck_from_two_publishers_interleave_out_of_order():
-    parameters = {'chains': ['head_imu'], 'version': 'v2',
-                  'qos_overrides.{ns}/joint_states.subscription.depth': 100}
+    parameters = {'chains': ['head_imu'], 'version': 'v2', **LOSSLESS}
     with NodeProcess(parameters) as node, Robot(node, tips=['head_imu']) as robot:
         inbox = robot.poses['head_imu']
         start = robot.connect(names=HEAD)
@@ -214,6 +214,7 @@ def test_publishers_go_and_come_back(shared, robot):
 
 
 def test_warnings_name_what_is_wrong_and_do_not_flood_the_log():
+    began = time.monotonic()
     with NodeProcess(LOSSLESS) as node, Robot(node) as robot:
         t = robot.connect()
         for i in range(1, 50):
@@ -229,7 +230,8 @@ def test_warnings_name_what_is_wrong_and_do_not_flood_the_log():
         robot.send(t - 10 * SECOND, LEFT, Q[:6])
         robot.wait_for(robot.left, t - 10 * SECOND)
         warnings = [line for line in node.log().splitlines() if '[WARN]' in line]
+    most = 1 + (time.monotonic() - began) // 5  # each is repeated after 5 s
     for word in ('11 values for 12 names', "'l_knee' stands twice", 'r_ankle_roll nan',
                  'header.stamp', 'time stepped back', 'r_hip_pitch never seen'):
-        assert sum(word in line for line in warnings) == 1, (word, warnings)
-    assert len(warnings) == 6, warnings
+        assert 1 <= sum(word in line for line in warnings) <= most, (word, warnings)
+    assert len(warnings) <= 6 * most, warnings

@@ -24,8 +24,11 @@ class Twists:
         self.inboxes = {tip: robot.listen(TwistStamped, node.topic(f'{tip}/twist'))
                         for tip in FEET}
         self.stamp = SECOND
-        while not all(self.inboxes.values()):
+
+        def answered():
             self.send(Q, np.zeros(12))
+            return all(self.inboxes.values())
+        robot.until(answered, 'twists of both feet')
         self.settle()
 
     def send(self, q, qdot, names=BOTH):

@@ -88,7 +88,7 @@ def test_stamps_change_live(feet):
     assert robot.change(stamp_source='now').successful
     before = robot.node.get_clock().now().nanoseconds
     robot.send(feet.stamp)
-    robot.until(lambda: robot.right, 'a pose')
+    robot.until(lambda: robot.left and robot.right, 'both poses')
     assert robot.left.stamps()[0] >= before
     for inbox in robot.poses.values():
         inbox.clear()

@@ -1,6 +1,7 @@
 """Stamps, timeouts, looping bags and simulated time."""
 
 from itertools import pairwise
+import time
 
 from node_harness import BOTH, DEEP, LEFT, LOSSLESS, NodeProcess, RIGHT, Robot, SECOND
 import pytest
@@ -29,7 +30,7 @@ def robot(shared):
 def test_zero_stamp_becomes_now(robot):
     before = robot.node.get_clock().now().nanoseconds
     robot.send(0)
-    robot.until(lambda: robot.right, 'a pose')
+    robot.until(lambda: robot.left and robot.right, 'both poses')
     now = robot.node.get_clock().now().nanoseconds
     assert before <= robot.left.stamps()[0] == robot.right.stamps()[0] <= now
     robot.send(robot.start)  # back in time, for the tests to come
@@ -55,13 +56,14 @@ def test_other_chains_and_pauses_are_no_reason_to_hold_back(robot):
 
 
 def test_timeout_of_zero_is_none():
-    with NodeProcess({'joint_timeout': 0.0}) as node, Robot(node) as robot:
+    with NodeProcess({'joint_timeout': 0.0, **LOSSLESS}) as node, Robot(node) as robot:
         t = robot.connect() + 3600 * SECOND
         robot.send(t, LEFT[:1])
         assert robot.take(robot.left, t).stamps() == [t]
 
 
 def test_looping_bag_gives_every_pose_in_every_loop_and_is_said_once():
+    began = time.monotonic()
     with NodeProcess(LOSSLESS) as node, Robot(node) as robot:
         first = robot.connect() + 100 * SECOND
         stamps = [first + 10 * MS * i for i in range(200)]
@@ -70,7 +72,7 @@ def test_looping_bag_gives_every_pose_in_every_loop_and_is_said_once():
         robot.until(lambda: len(robot.left) == len(robot.right) == 800, 'all poses')
         assert robot.left.stamps() == robot.right.stamps() == stamps * 4
         said = [line for line in node.log().splitlines() if 'time stepped back' in line]
-        assert len(said) == 1
+        assert 1 <= len(said) <= 1 + (time.monotonic() - began) // 5  # again after 5 s
 
 
 def test_short_loop_within_the_timeout_is_noticed_too(robot):
@@ -103,6 +105,7 @@ def test_stamps_beyond_time_are_harmless(robot):
 def test_simulated_time_stamps_what_has_no_stamp_and_may_step_back():
     parameters = {'use_sim_time': True, **LOSSLESS}
     with NodeProcess(parameters, ['-r', '/clock:=clock']) as node, Robot(node) as robot:
+        robot.connect()  # of each foot alike, for their poses are counted
         clock = robot.node.create_publisher(Clock, 'clock', DEEP)
 
         def tick(stamp):

@@ -88,11 +88,11 @@ def _verdict(messages: int, rejected: Counter[str], counts: ChainCounts,
         return DiagnosticStatus.STALE, 'no JointState received'
     concerns = [f'{_WORDS[reason]}: {_listed(joints)}'
                 for reason, joints in sorted(counts.joints.items())]
-    if counts.ready:
-        rejected.pop('empty_position', None)  # is counted only, unless nothing else comes
-    if rejected:
-        concerns.append('messages: ' + ', '.join(
-            f'{reason} {count}' for reason, count in sorted(rejected.items())))
+    # An empty position is counted only, unless nothing else comes.
+    worth_telling = [f'{reason} {count}' for reason, count in sorted(rejected.items())
+                     if counts.ready == 0 or reason != 'empty_position']
+    if worth_telling:
+        concerns.append('messages: ' + ', '.join(worth_telling))
     if counts.ready == 0:
         if missing and 'missing_joint' not in counts.joints:
             concerns.insert(0, f'missing: {", ".join(missing)}')

@@ -1,4 +1,4 @@
-"""Signals that ask a process to stop, as an exception that lets it clean up."""
+"""Signals that ask a process to stop: as an exception that lets it clean up, or held back."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 import signal
 from types import FrameType
+
+_STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @contextmanager
@@ -21,6 +23,21 @@ def stop_on_signals() -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+@contextmanager
+def held_signals() -> Iterator[None]:
+    """While it lasts, the signals that end the process wait."""
+    arrived: list[int] = []
+    before = {number: signal.signal(number, lambda number, frame: arrived.append(number))
+              for number in _STOPS}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        if arrived:
+            signal.raise_signal(arrived[0])
 
 
 def _stop(number: int, frame: FrameType | None) -> None:

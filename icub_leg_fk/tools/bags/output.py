@@ -8,19 +8,18 @@ next run that writes the same bag.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 import fcntl
 import os
 from pathlib import Path
 import shutil
-import signal
 
 from icub_leg_fk.errors import OutputFileError
 from icub_leg_fk.tools.bags.metadata import METADATA, read_metadata
 from icub_leg_fk.tools.bags.reader import KINDS
+from icub_leg_fk.tools.signals import held_signals
 
 _ENDINGS = ('', '-wal', '-shm', '-journal')  # of a storage file and of what sqlite adds
-_STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class OutputPlace:
@@ -62,14 +61,14 @@ class OutputPlace:
             OutputFileError: the target has come into being meanwhile.
         """
         self._check_target()
-        with _uninterrupted():
+        with held_signals():
             if self._target.exists():
                 self._target.rename(self._old)
             self.bag.rename(self._target)
 
     def close(self) -> None:
         """Remove everything but a bag that has been put in its place."""
-        with _uninterrupted():
+        with held_signals():
             self._clear()
             shutil.rmtree(self._aside, ignore_errors=True)
             os.close(self._lock)
@@ -134,14 +133,3 @@ def _is_bag(path: Path) -> bool:
     known = {METADATA, *(f'{file}{ending}' for file in files for ending in _ENDINGS)}
     return all(entry.name in known and entry.is_file() and not entry.is_symlink()
                for entry in path.iterdir())
-
-
-@contextmanager
-def _uninterrupted() -> Iterator[None]:
-    """Let signals wait until a few steps that belong together are done."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPS)
-    try:
-        yield
-    finally:
-        with suppress(OSError):
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import atexit
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 import os
 import signal
 import subprocess
@@ -13,8 +12,8 @@ import tempfile
 from types import TracebackType
 
 from icub_leg_fk.errors import LegFKError
+from icub_leg_fk.tools.signals import held_signals
 
-_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _STOP_TIMEOUT = 10.0  # s
 _HIGHEST_DOMAIN = 101  # beyond it DDS's ports meet those that Linux hands out
 
@@ -31,21 +30,6 @@ def stay_on_this_machine() -> str:
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     os.environ.pop('ROS_STATIC_PEERS', None)
     return os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % _HIGHEST_DOMAIN))
-
-
-@contextmanager
-def _held_signals() -> Iterator[None]:
-    """While it lasts, the signals that end the process wait."""
-    arrived: list[int] = []
-    before = {number: signal.signal(number, lambda number, frame: arrived.append(number))
-              for number in _ENDING}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-        if arrived:
-            signal.raise_signal(arrived[0])
 
 
 class NodeProcess:
@@ -66,7 +50,7 @@ class NodeProcess:
 
     def __enter__(self) -> NodeProcess:
         # A session of its own: Ctrl-C reaches the demonstration alone, which then stops the node.
-        with _held_signals():  # it must not get away between its start and the next line
+        with held_signals():  # it must not get away between its start and the next line
             self._process = subprocess.Popen(
                 self._words, stdin=subprocess.DEVNULL, stdout=self._log, stderr=self._log,
                 start_new_session=True)
@@ -75,7 +59,7 @@ class NodeProcess:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
-        with _held_signals():
+        with held_signals():
             status = self._stop()
         if kind is None and status != 0:
             raise NodeError(f'the node was stopped by SIGINT and gave exit status {status}, '

@@ -10,6 +10,7 @@ from typing import Any
 from icub_leg_fk.errors import LegFKError, MissingDependencyError
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.tools.recording import JointRecording
+from icub_leg_fk.tools.signals import held_signals
 import numpy as np
 
 DISCOVERY_TIMEOUT = 20.0  # s
@@ -129,7 +130,7 @@ class Replay:
                 stamp = time.time_ns()
                 self._probes.add(stamp)
                 self._publish(stamp, 0)
-            self._executor.spin_once(timeout_sec=0.02)
+            self._spin(0.02)
 
     def play(self, on_time: Callable[[float], None], period: float, check: Callable[[], None]
              ) -> None:
@@ -151,7 +152,7 @@ class Replay:
                     on_time(now - start)
                 # A negative timeout would be none.
                 wait = min(start + offset, next_call) - now
-                self._executor.spin_once(timeout_sec=max(wait, 0.0))
+                self._spin(max(wait, 0.0))
             stamp = max(start_ns + round(offset * 1e9), self._last_stamp + 1)
             self._message_of[stamp] = index
             self._published[index] = time.monotonic()
@@ -159,6 +160,11 @@ class Replay:
             self.sent += 1
         self._await_the_rest(check)
         on_time(float(times[-1]))
+
+    def _spin(self, seconds: float) -> None:
+        # What a signal raises inside of rclpy it makes another exception of, or loses.
+        with held_signals():
+            self._executor.spin_once(timeout_sec=seconds)
 
     def _await_the_rest(self, check: Callable[[], None]) -> None:
         arrived, deadline = -1, 0.0
@@ -168,7 +174,7 @@ class Replay:
             if time.monotonic() > deadline:
                 return
             check()
-            self._executor.spin_once(timeout_sec=0.1)
+            self._spin(0.1)
 
     def _arrived(self) -> int:
         return sum(answers.arrived for answers in self.answers)
@@ -207,4 +213,5 @@ class Replay:
         if self._recording.velocities is not None:
             message.velocity = self._recording.velocities[index].tolist()
         self._last_stamp = stamp
-        self._publisher.publish(message)
+        with held_signals():
+            self._publisher.publish(message)
