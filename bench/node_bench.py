@@ -186,13 +186,24 @@ def _measure_growth(report: Report, bench: Bench, effort: Effort) -> None:
             keeping_up = {name: nodes[name] for name in names}
         for node in nodes.values():
             bench.forget(node)
+    _measure_chains(report, bench, effort)
+
+
+def _measure_chains(report: Report, bench: Bench, effort: Effort) -> None:
     chains, poses = ['left_leg', 'right_leg', 'head_imu'], [*POSES, 'head_imu/pose']
-    for count in range(1, 1 + len(chains)):
-        parameters = (f'chains:=[{",".join(chains[:count])}]', 'head_imu.version:=v2')
-        node = NodeProcess(f'chains_{count}', 'ours', poses[:count], parameters).start()
-        with closing(node):
-            _match(bench, [node])
-            _grow(report, bench, {'ours': node}, 'chains', count, _JOINTS, _RATE, effort)
+    with ExitStack() as stack:
+        nodes = {}
+        for count in range(1, 1 + len(chains)):
+            parameters = (f'chains:=[{",".join(chains[:count])}]', 'head_imu.version:=v2')
+            node = NodeProcess(f'chains_{count}', 'ours', poses[:count], parameters).start()
+            nodes[count] = stack.enter_context(closing(node))
+        _match(bench, nodes.values())
+        cpu: dict[int, list[float]] = {count: [] for count in nodes}
+        for _ in range(effort.rounds):
+            for count, node in nodes.items():
+                cpu[count].append(bench.stretch(node, _JOINTS, _RATE, effort.messages // 2).cpu)
+        for count, node in nodes.items():
+            report.grow('chains', 'ours', count, figure(cpu[count]))
             bench.forget(node)
 
 
