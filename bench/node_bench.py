@@ -196,15 +196,12 @@ def _measure_chains(report: Report, bench: Bench, effort: Effort) -> None:
         for count in range(1, 1 + len(chains)):
             parameters = (f'chains:=[{",".join(chains[:count])}]', 'head_imu.version:=v2')
             node = NodeProcess(f'chains_{count}', 'ours', poses[:count], parameters).start()
-            nodes[count] = stack.enter_context(closing(node))
+            nodes[str(count)] = stack.enter_context(closing(node))
         _match(bench, nodes.values())
-        cpu: dict[int, list[float]] = {count: [] for count in nodes}
-        for _ in range(effort.rounds):
-            for count, node in nodes.items():
-                cpu[count].append(bench.stretch(node, _JOINTS, _RATE, effort.messages // 2).cpu)
-        for count, node in nodes.items():
-            report.grow('chains', 'ours', count, figure(cpu[count]))
-            bench.forget(node)
+        turns = _take_turns(bench, nodes, list(nodes), effort.rounds, effort.messages // 2)
+        for count, stretches in turns.items():
+            report.grow('chains', 'ours', int(count), figure([turn.cpu for turn in stretches]))
+            bench.forget(nodes[count])
 
 
 def _grow(report: Report, bench: Bench, nodes: dict[str, NodeProcess], panel: str, x: float,

@@ -139,10 +139,13 @@ def _parser(words: Sequence[str]) -> Parser:
 
 def _is_negative(word: str) -> bool:
     """Return whether a word is a negative number, or a list of numbers that begins with one."""
+    if not word.startswith('-'):
+        return False
     try:
-        return word.startswith('-') and isinstance(float(word.partition(',')[0]), float)
+        float(word.partition(',')[0])
     except ValueError:
         return False
+    return True
 
 
 def _forget_output() -> None:

@@ -17,7 +17,7 @@ from icub_leg_fk.tools.chain_arguments import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from icub_leg_fk.kinematics import Catalog, Chain
     from icub_leg_fk.tools.plot_bag import BagTracks
@@ -79,9 +79,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputFileError(f'{args.input}: found nothing of that name, allowed: a bag or a CSV '
                              'file')
     catalog = Catalog.load(args.kinematics_file)
-    names = args.chains or default_chains(catalog)
-    chains = chosen_chains(catalog, names, args.version, args.foot_frame,
-                           own_versions(args, names))
+    chains = _chosen_chains(catalog, args)
     roots = {chain.root_frame for chain in chains}
     if len(roots) > 1:
         raise LegFKError(f'--chains: found the root frames {", ".join(sorted(roots))}, allowed: '
@@ -99,22 +97,6 @@ def run(args: argparse.Namespace) -> int:
                  *(f'not all could be read: {problem}' for problem in found.damage)):
         print(f'leg_fk: note: {text}', file=sys.stderr)
     return PARTLY_READ if found.damage else 0
-
-
-def default_chains(catalog: Catalog) -> list[str]:
-    """Return both legs, or else all chains that the catalog has."""
-    return [name for name in DEFAULT_CHAINS if name in catalog.chains] or [*catalog.chains]
-
-
-def chosen_chains(catalog: Catalog, names: Sequence[str], version: str | None, foot_frame: str,
-                  own: Mapping[str, str]) -> list[Chain]:
-    """Return the chains asked for, in their own version or the common one.
-
-    Raises:
-        UnknownNameError: no such chain, version or tip frame; lists the known ones.
-    """
-    return [catalog.chain(name, chosen_version(catalog, name, own.get(name, version)), foot_frame)
-            for name in dict.fromkeys(names)]
 
 
 def telling_instants(tracks: Sequence[ChainTrack]) -> list[float]:
@@ -137,6 +119,15 @@ def telling_instants(tracks: Sequence[ChainTrack]) -> list[float]:
             return instants
     return [start + (end - start) * share for share in (0.0, 1 / 3, 2 / 3, 1.0)] \
         if end > start else [start]
+
+
+def _chosen_chains(catalog: Catalog, args: argparse.Namespace) -> list[Chain]:
+    """Return the chains asked for, or both legs, or else all that the catalog has."""
+    legs = [name for name in DEFAULT_CHAINS if name in catalog.chains]
+    names = args.chains or legs or [*catalog.chains]
+    own = own_versions(args, names)
+    return [catalog.chain(name, chosen_version(catalog, name, own.get(name, args.version)),
+                          args.foot_frame) for name in dict.fromkeys(names)]
 
 
 def _read(path: Path, chains: Sequence[Chain], topic: str | None) -> BagTracks:
