@@ -27,8 +27,7 @@ def measure_kinematics(report: Report, seconds: float) -> None:
     """Add the rows of point 5; each figure takes about `seconds`."""
     chain = Catalog.load(None).chain('left_leg', 'v2_5', 'dh')
     rng = np.random.default_rng(5)
-    lower, upper = np.array([(link.lower, link.upper) for link in chain.links]).T
-    Q = rng.uniform(lower, upper, (_MANY, len(chain.links)))
+    Q = rng.uniform(chain.lower, chain.upper, (_MANY, chain.n))
     vectors = [tuple(q) for q in Q[:1000].tolist()]
 
     def one() -> None:

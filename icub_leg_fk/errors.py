@@ -4,6 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+_LONG_NAME = 10  # characters; from here on a second slip is still a near miss
+
+
+def near(name: str, choices: Iterable[str]) -> str | None:
+    """Return the choice that a name is a misspelling of; None if there is none.
+
+    Near is one slip (a character too many, too few or another), two from ten characters on.
+    """
+    slips = 2 if len(name) >= _LONG_NAME else 1
+    distances = {choice: _edit_distance(name, choice) for choice in choices if choice != name}
+    close = [choice for choice, distance in distances.items()
+             if distance <= slips and distance < len(name)]
+    return min(close, key=distances.__getitem__, default=None)
+
+
+def _edit_distance(a: str, b: str) -> int:
+    """Return the Levenshtein distance."""
+    row = list(range(len(b) + 1))
+    for i, x in enumerate(a, 1):
+        before, row[0] = row[0], i
+        for j, y in enumerate(b, 1):
+            before, row[j] = row[j], min(row[j] + 1, row[j - 1] + 1, before + (x != y))
+    return row[-1]
+
 
 class LegFKError(Exception):
     """Base of every error this package raises for a user's mistake; its text is one line."""
@@ -22,8 +46,10 @@ class UnknownNameError(LegFKError):
         self.kind = kind
         self.name = name
         self.choices = tuple(choices)
-        known = ', '.join(self.choices) or '(none)'
-        super().__init__(f'unknown {kind}: {name!r}; known: {known}')
+        known = ', '.join(self.choices) or 'none'
+        guess = near(name, self.choices)
+        hint = f'did you mean {guess!r}? ' if guess else ''
+        super().__init__(f'unknown {kind} {name!r}; {hint}known: {known}')
 
 
 class JointVectorError(LegFKError):

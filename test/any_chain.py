@@ -1,4 +1,4 @@
-"""Any chain for hypothesis: random tables, sliding joints, right angles and odd twists."""
+"""Any chain for hypothesis: random tables, all joint types and signs, right angles, odd twists."""
 
 from collections.abc import Sequence
 from math import pi
@@ -12,8 +12,14 @@ ANGLES = st.one_of(
     st.sampled_from([0.0, pi / 2, -pi / 2, pi, -pi, 3 * pi / 2, 1e-9, -1e-300, pi / 2 + 1e-12,
                      pi - 1e-12]),
     st.floats(-4, 4))
-LINKS = st.builds(DHLink, a=LENGTHS, d=LENGTHS, alpha=ANGLES, offset=ANGLES,
-                  joint_type=st.sampled_from(['revolute', 'revolute', 'prismatic']))
+
+
+def links(joint_types: Sequence[str]) -> st.SearchStrategy[DHLink]:
+    return st.builds(DHLink, a=LENGTHS, d=LENGTHS, alpha=ANGLES, offset=ANGLES,
+                     joint_type=st.sampled_from(joint_types), sign=st.sampled_from([1, 1, -1]))
+
+
+LINKS = links(['revolute', 'revolute', 'prismatic', 'fixed'])
 
 
 @st.composite
@@ -28,20 +34,28 @@ def transforms(draw: st.DrawFn) -> np.ndarray:
 
 
 def chain_of(links: Sequence[DHLink], T_root_0: np.ndarray | None = None,
-             virtual_link: DHLink | None = None, T_n_tip: np.ndarray | None = None) -> Chain:
+             T_n_tip: np.ndarray | None = None) -> Chain:
+    joints = [i for i, link in enumerate(links) if link.joint_type != 'fixed']
     return Chain(
         name='any', version='', root_frame='root', tip='tip', tip_frame='tip',
-        joint_names=tuple(f'joint_{i}' for i in range(len(links))), links=tuple(links),
-        T_root_0=np.eye(4) if T_root_0 is None else T_root_0, virtual_link=virtual_link,
+        joint_names=tuple(f'joint_{i}' for i in joints), links=tuple(links),
+        T_root_0=np.eye(4) if T_root_0 is None else T_root_0,
         T_n_tip=np.eye(4) if T_n_tip is None else T_n_tip)
 
 
-CHAINS = st.builds(chain_of, st.lists(LINKS, min_size=1, max_size=7), transforms(),
-                   st.one_of(st.none(), LINKS), transforms())
+@st.composite
+def row_lists(draw: st.DrawFn) -> list[DHLink]:
+    """Return up to seven rows, at least one of them with a joint."""
+    rows = draw(st.lists(LINKS, max_size=6))
+    rows.insert(draw(st.integers(0, len(rows))), draw(links(['revolute', 'prismatic'])))
+    return rows
+
+
+CHAINS = st.builds(chain_of, row_lists(), transforms(), transforms())
 
 
 @st.composite
 def chains_and_positions(draw: st.DrawFn) -> tuple[Chain, list[list[float]]]:
     chain = draw(CHAINS)
-    n = len(chain.links)
-    return chain, draw(st.lists(st.lists(ANGLES, min_size=n, max_size=n), min_size=1, max_size=3))
+    q = st.lists(ANGLES, min_size=chain.n, max_size=chain.n)
+    return chain, draw(st.lists(q, min_size=1, max_size=3))

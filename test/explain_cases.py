@@ -66,7 +66,7 @@ def explain(*words):
 
 
 def positions(chain, seed):
-    return np.random.default_rng(seed).uniform(-1, 1, len(chain.links)).tolist()
+    return np.random.default_rng(seed).uniform(-1, 1, chain.n).tolist()
 
 
 def in_metres(T):

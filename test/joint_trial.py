@@ -29,8 +29,8 @@ class Trial:
     def __init__(self, chains, timeout=SECOND // 2):
         self.now = 1_700_000_000 * SECOND
         self.model = JointModel([
-            {joint: (link.lower, link.upper)
-             for joint, link in zip(chain.joint_names, chain.links, strict=True)}
+            {joint: link.limits
+             for joint, link in zip(chain.joint_names, chain.joints, strict=True)}
             for chain in chains], timeout)
         self.reports = [], [], []
         inputs = [JointInput(chains, timeout / SECOND,

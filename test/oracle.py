@@ -26,10 +26,10 @@ LEFT_V2_5: list[Row] = [
 RIGHT_V2_5: list[Row] = [
     (0, 0, pi / 2, 90), (0, 0, pi / 2, 90), (-0.9175, 234.545, -pi / 2, -90),
     (-200.5, 0, pi, 90), (0, 0, pi / 2, 0), (-68.05, 3.5, pi, 0)]
-# Of iKin, not of the documents.
+# Of iKin, not of the documents; the left knee's d is the robot's, which iKin prints as +6.2.
 LEFT_V3: list[Row] = [
     (9, 0, -pi / 2, 90), (-15, -10.6, -pi / 2, 90), (15, -266.8, pi / 2, -90),
-    (-255.988, 6.2, pi, 90), (-35, 0, -pi / 2, 0), (-53.2, 0, 0, 0)]
+    (-255.988, -6.2, pi, 90), (-35, 0, -pi / 2, 0), (-53.2, 0, 0, 0)]
 RIGHT_V3: list[Row] = [
     (9, 0, pi / 2, 90), (-15, 10.6, pi / 2, 90), (15, 266.8, -pi / 2, -90),
     (-255.988, 6.2, pi, 90), (-35, 0, pi / 2, 0), (-53.2, 0, pi, 0)]
@@ -44,18 +44,30 @@ def _leg_root(x: float, y: float, z: float) -> np.ndarray:
 
 HEAD_ROOT = np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
 T_NIS = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0.0066], [0, 0, 0, 1]])
+V3_ROOT = {side: np.array([[-1, 0, 0, 0.0216], [0, 0, -1, y], [0, -1, 0, 0], [0, 0, 0, 1]])
+           for side, y in (('left', 0.07365), ('right', -0.07365))}
 SOLE = np.array([[0.0, 0, 1, 0], [0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
 
 # (chain, version): root transform, rows, transform from the tip to the last frame.
 TABLES: dict[tuple[str, str], tuple[np.ndarray, list[Row], np.ndarray]] = {
     ('left_leg', 'v1'): (_leg_root(0, -68.1, -119.9), LEFT_V1, np.eye(4)),
     ('left_leg', 'v2_5'): (_leg_root(0, -68.1, -119.9), LEFT_V2_5, np.eye(4)),
-    ('left_leg', 'v3'): (_leg_root(-21.6, -73.65, -60.5), LEFT_V3, np.eye(4)),
+    ('left_leg', 'v3'): (V3_ROOT['left'], LEFT_V3, np.eye(4)),
     ('right_leg', 'v1'): (_leg_root(0, 68.1, -119.9), RIGHT_V1, np.eye(4)),
     ('right_leg', 'v2_5'): (_leg_root(0, 68.1, -119.9), RIGHT_V2_5, np.eye(4)),
-    ('right_leg', 'v3'): (_leg_root(-21.6, 73.65, -60.5), RIGHT_V3, np.eye(4)),
+    ('right_leg', 'v3'): (V3_ROOT['right'], RIGHT_V3, np.eye(4)),
     ('head_imu', 'v2'): (HEAD_ROOT, HEAD_V2, T_NIS),
 }
+V3_SOLE = SOLE @ np.array([[1, 0, 0, 0.02288], [0, 1, 0, 0], [0, 0, 1, -0.0126], [0, 0, 0, 1]])
+
+
+def tip_transform(version: str, frame: str) -> np.ndarray:
+    """Return the transform from a tip frame to the end of the table."""
+    if frame != 'sole':
+        return np.eye(4)
+    return V3_SOLE if version == 'v3' else SOLE
+
+
 CASES = [(name, version, frame) for name, version in TABLES
          for frame in (('dh', 'sole') if name != 'head_imu' else ('dh',))]
 
@@ -75,7 +87,7 @@ class PinocchioArm:
             along_z = pin.SE3(np.eye(3), np.array([0, 0, d / 1000]))
             along_x = pin.SE3(np.eye(3), np.array([a / 1000, 0, 0]))
             placement = along_z * along_x * pin.SE3(pin.utils.rotate('x', alpha), np.zeros(3))
-        placement = placement * pin.SE3(T_n_tip @ (SOLE if frame == 'sole' else np.eye(4)))
+        placement = placement * pin.SE3(T_n_tip @ tip_transform(version, frame))
         self.tip = self.model.addFrame(
             pin.Frame('tip', joint, 0, placement, pin.FrameType.OP_FRAME))
         self.data = self.model.createData()
@@ -102,7 +114,7 @@ class KDLArm:
         for a, d, alpha, offset in rows:
             link = kdl.Frame.DH(a / 1000, alpha, d / 1000, np.deg2rad(offset))
             self.chain.addSegment(kdl.Segment(kdl.Joint(kdl.Joint.RotZ), link))
-        T = T_n_tip @ (SOLE if frame == 'sole' else np.eye(4))
+        T = T_n_tip @ tip_transform(version, frame)
         self.chain.addSegment(kdl.Segment(fixed, self._frame(T)))
         self.solver = kdl.ChainFkSolverPos_recursive(self.chain)
 
@@ -142,7 +154,7 @@ class HandMadeArm:
 
     def __init__(self, name: str, version: str, frame: str) -> None:
         self.T_root_0, self.rows, self.T_n_tip = TABLES[name, version]
-        self.T_dh_tip = SOLE if frame == 'sole' else np.eye(4)
+        self.T_dh_tip = tip_transform(version, frame)
 
     def forward(self, q: np.ndarray) -> np.ndarray:
         T = self.T_root_0
@@ -152,12 +164,10 @@ class HandMadeArm:
 
 
 def product(chain: Chain, q: Sequence[float]) -> np.ndarray:
-    """Return T_root_tip of any chain, each link as the product of its four basic transforms."""
-    T = np.array(chain.T_root_0)
-    for link, position in zip(chain.links, q, strict=True):
-        turn, slide = (0.0, position) if link.joint_type == 'prismatic' else (position, 0.0)
+    """Return T_root_tip of any chain, each row as the product of its four basic transforms."""
+    T, positions = np.array(chain.T_root_0), iter(q)
+    for link in chain.links:
+        moved = 0.0 if link.joint_type == 'fixed' else link.sign * next(positions)
+        turn, slide = (0.0, moved) if link.joint_type == 'prismatic' else (moved, 0.0)
         T = T @ basic_product(link.a, link.d + slide, link.alpha, link.offset + turn)
-    if chain.virtual_link is not None:
-        link = chain.virtual_link
-        T = T @ basic_product(link.a, link.d, link.alpha, link.offset)
     return T @ chain.T_n_tip

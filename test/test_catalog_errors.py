@@ -7,7 +7,7 @@ import tempfile
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from icub_leg_fk.errors import CatalogError
-from icub_leg_fk.kinematics import Catalog, yaml_file
+from icub_leg_fk.kinematics import Catalog, yaml_fields
 import pytest
 import yaml
 
@@ -34,16 +34,18 @@ chains:
         links:
           - {a: 10, d: 20, alpha: -90, offset: 90, range: [-44, 132]}
           - {a: 30, d: 40, alpha: 180, offset: 0, type: prismatic, erratum: "odd"}
-        virtual_link: {a: 1, d: 6.6, alpha: 90, offset: 0}
+          - {a: 1, d: 6.6, alpha: 90, offset: 0, type: fixed}
         T_nIs: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
 """
 DH = 'a, d, alpha, offset'
-LINK = f'{DH}, range, type, erratum'
-NUMBER_MM, NUMBER_DEG = 'a finite number (mm)', 'a finite number (deg)'
-RIGID = 'a rotation, a translation and the last row 0 0 0 1'
+LINK = f'{DH}, range, robot_range, sign, type, erratum'
+NUMBER_MM, NUMBER_DEG = 'a finite number (mm)', 'a finite number (deg, or as in pi/2)'
+RIGID = 'a rotation (to four decimals at least), a translation and the last row 0 0 0 1'
 NAME = 'up to 100 letters, digits and _ . / -'
+FRAME = f'{NAME}, not beginning with /'
 WORD = 'a letter, then up to 63 letters, digits and _'
 FILE, LEG, V1 = 'kinematics file', 'chain leg', 'chain leg, version v1'
+VERSION = 'T_Ro0, links, T_nIs, convention, source, root_frame, joints, tip_frames'
 ROW_0, ROW_1 = f'{V1}, row 0', f'{V1}, row 1'
 
 
@@ -52,7 +54,7 @@ def _loader(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
     """Read with libyaml, and without it, as where PyYAML was built so."""
     if not hasattr(yaml, request.param):
         pytest.skip('this PyYAML has no libyaml')
-    monkeypatch.setattr(yaml_file, 'Loader', getattr(yaml, request.param))
+    monkeypatch.setattr(yaml_fields, 'Loader', getattr(yaml, request.param))
 
 
 def refusal(path: Path) -> CatalogError:
@@ -81,7 +83,8 @@ MISTAKES = {
     'units are no mapping': ('{length: mm, angle: deg}', 'mm', 1, f'{FILE}, field units',
                              "'mm'", 'a mapping with length, angle'),
     # --- structure
-    'unknown top key': ('units:', 'unit:', 1, FILE, "key 'unit'", 'units, chains'),
+    'unknown top key': ('units:', 'unit:', 1, FILE,
+                        "unknown key 'unit' (did you mean 'units'?)", 'units, chains'),
     'no chains': (GOOD[GOOD.index('chains'):], '', 1, f'{FILE}, field chains', 'nothing',
                   'all of units, chains'),
     'empty chains': (GOOD[GOOD.index('chains'):], 'chains: {}', 2, f'{FILE}, field chains',
@@ -94,23 +97,23 @@ MISTAKES = {
                                        f'a name: {WORD}'),
     'chain name is a list': ('  leg:', '  ? [leg]\n  :', 3, f'{FILE}, field chains', 'a list',
                              f'a name: {WORD}'),
-    'chain twice': (GOOD, GOOD + '  leg: {}\n', 25, LEG, 'the key again', 'each key once'),
+    'chain twice': (GOOD, GOOD + '  leg: {}\n', 25, LEG, 'the key twice', 'each key once'),
     'chain is no mapping': (GOOD[GOOD.index('  leg:'):], '  leg: 5', 3, LEG, "'5'",
                             'a mapping with tip, root_frame, joints, tip_frames, versions'),
-    'unknown chain key': ('root_frame:', 'root:', 5, LEG, "key 'root'",
+    'unknown chain key': ('root_frame:', 'root:', 5, LEG, "unknown key 'root'",
                           'tip, root_frame, joints, tip_frames, versions'),
     'missing chain key': ('    tip: foot\n', '', 4, f'{LEG}, field tip', 'nothing',
                           'all of tip, root_frame, joints, tip_frames, versions'),
     'key twice': ('tip: foot', 'tip: foot\n    tip: foot', 5, f'{LEG}, field tip',
-                  'the key again', 'each key once'),
+                  'the key twice', 'each key once'),
     # --- names
     'tip is no word': ('tip: foot', 'tip: left foot', 4, f'{LEG}, field tip', "'left foot'",
                        f'a name: {WORD}'),
     'tip is nothing': ('tip: foot', 'tip:', 4, f'{LEG}, field tip', 'nothing', f'a name: {WORD}'),
     'frame with a space': ('root_link', 'root link', 5, f'{LEG}, field root_frame',
-                           "'root link'", f'a frame id: {NAME}'),
+                           "'root link'", f'a frame id: {FRAME}'),
     'frame is a mapping': ('root_link', '{a: b}', 5, f'{LEG}, field root_frame',
-                           'a mapping', f'a frame id: {NAME}'),
+                           'a mapping', f'a frame id: {FRAME}'),
     'joint name of several lines': ('[hip, knee]', '[hip, "kn\\nee"]', 6, f'{LEG}, field joints',
                                     "the text 'kn\\nee'", f'a joint name: {NAME}'),
     'joint twice': ('[hip, knee]', '[hip,\n      hip]', 7, f'{LEG}, field joints',
@@ -123,26 +126,22 @@ MISTAKES = {
         GOOD, GOOD + GOOD[GOOD.index('  leg:'):].replace('  leg:', '  arm:'), 26,
         'chain arm, field tip', 'foot, the tip of chain leg', 'a tip of its own'),
     # --- tip frames
-    'no dh frame': ('      dh: {frame: foot_dh}\n', '', 8, f'{LEG}, field tip_frames, field dh',
-                    'nothing', 'all of dh'),
-    'unknown tip frame': ('sole:', 'toe:', 9, f'{LEG}, field tip_frames', "key 'toe'",
-                          'dh, sole'),
+    'no tip frames': (GOOD[GOOD.index('      dh'):GOOD.index('    versions')], '      {}\n', 8,
+                      f'{LEG}, field tip_frames', 'none', 'at least one tip frame'),
+    'frame id with a leading slash': ('root_link', '/root_link', 5, f'{LEG}, field root_frame',
+                                      "'/root_link'", f'a frame id: {FRAME}'),
     'tip frame without name': ('{frame: foot_dh}', '{}', 8,
-                               f'{LEG}, field tip_frames, field dh, field frame', 'nothing',
+                               f'{LEG}, field tip_frames, dh, field frame', 'nothing',
                                'all of frame'),
-    'dh frame with a transform': ('{frame: foot_dh}', '{frame: foot_dh, transform: 1}', 8,
-                                  f'{LEG}, field tip_frames, field dh', "key 'transform'",
-                                  'frame'),
     # --- versions
     'versions empty': (GOOD[GOOD.index('versions'):], 'versions: {}', 12,
                        f'{LEG}, field versions', 'none', 'at least one version'),
     'version name with a space': ('      v1:', '      v 1:', 13, f'{LEG}, field versions', "'v 1'",
                                   f'a name: {NAME}'),
-    'version twice': (GOOD, GOOD + '      v1: {}\n', 25, V1, 'the key again', 'each key once'),
-    'unknown version key': ('virtual_link', 'link_7', 23, V1, "key 'link_7'",
-                            'T_Ro0, links, virtual_link, T_nIs, source'),
-    'missing root transform': ('        T_Ro0:', '        T_nIs2:', 15, V1, "key 'T_nIs2'",
-                               'T_Ro0, links, virtual_link, T_nIs, source'),
+    'version twice': (GOOD, GOOD + '      v1: {}\n', 25, V1, 'the key twice', 'each key once'),
+    'unknown version key': ('T_nIs:', 'link_7:', 24, V1, "unknown key 'link_7'", VERSION),
+    'missing root transform': ('        T_Ro0:', '        T_nIs2:', 15, V1,
+                               "unknown key 'T_nIs2' (did you mean 'T_nIs'?)", VERSION),
     'source of several lines': ('"somewhere"', '|\n          some\n          where', 14,
                                 f'{V1}, field source', "the text 'some\\nwhere\\n'",
                                 'text of one line'),
@@ -158,26 +157,27 @@ MISTAKES = {
     'matrix entry is a word': ('[0, -1, 0, -119.9]', '[0, -1, o, -119.9]', 18,
                                f'{V1}, field T_Ro0, row 2, column 2', "'o'", 'a finite number'),
     'matrix that scales': ('[1, 0, 0, 5]', '[2, 0, 0, 5]', 16, f'{V1}, field T_Ro0',
-                           'no rigid transform', RIGID),
+                           'a matrix that is no rigid transform', RIGID),
     'matrix that mirrors': ('[1, 0, 0, 5]', '[-1, 0, 0, 5]', 16, f'{V1}, field T_Ro0',
-                            'no rigid transform', RIGID),
+                            'a matrix that is no rigid transform', RIGID),
     'matrix of huge numbers': ('[1, 0, 0, 5]', '[1e308, 1e308, 0, 5]', 16, f'{V1}, field T_Ro0',
-                               'no rigid transform', RIGID),
+                               'a matrix that is no rigid transform', RIGID),
     'last row of a matrix': ('[1, 0, 0, 0], [0, 0, 0, 1]]', '[1, 0, 0, 0], [0, 0, 1, 1]]', 11,
-                             f'{LEG}, field tip_frames, field sole, field transform',
-                             'no rigid transform', RIGID),
+                             f'{LEG}, field tip_frames, sole, field transform',
+                             'a matrix that is no rigid transform', RIGID),
     # --- rows
-    'row too few': (GOOD[GOOD.index('          - {a: 30'):GOOD.index('        virtual')], '', 21,
-                    f'{V1}, field links', '1 item', '2 rows, one per joint'),
-    'row too many': ('        virtual_link', '          - {}\n        virtual_link', 21,
-                     f'{V1}, field links', '3 items', '2 rows, one per joint'),
-    'links is a mapping': (GOOD[GOOD.index('links:'):], 'links: {}', 20, f'{V1}, field links',
-                           'a mapping', '2 rows, one per joint'),
+    'row too few': (GOOD[GOOD.index('          - {a: 30'):GOOD.index('          - {a: 1,')],
+                    '', 21, f'{V1}, field links', '1 row with a joint', '2, one per joint'),
+    'row too many': ('          - {a: 1,', '          - {a: 0, d: 0, alpha: 0, offset: 0}\n'
+                     '          - {a: 1,', 21, f'{V1}, field links', '3 rows with a joint',
+                     '2, one per joint'),
+    'links is a mapping': (GOOD[GOOD.index('links:'):], 'links: {}', 20, V1,
+                           'a mapping', 'a list of rows'),
     'row is a list': ('{a: 10, d: 20, alpha: -90, offset: 90, range: [-44, 132]}', '[10, 20]',
                       21, ROW_0, 'a list', f'a mapping with {LINK}'),
     'cell missing': ('d: 20, ', '', 21, f'{ROW_0}, field d', 'nothing', f'all of {DH}'),
-    'unknown cell': ('offset: 0, type', 'theta: 0, type', 22, ROW_1, "key 'theta'", LINK),
-    'cell twice': ('{a: 30', '{a: 30, a: 31', 22, f'{ROW_1}, field a', 'the key again',
+    'unknown cell': ('offset: 0, type', 'theta: 0, type', 22, ROW_1, "unknown key 'theta'", LINK),
+    'cell twice': ('{a: 30', '{a: 30, a: 31', 22, f'{ROW_1}, field a', 'the key twice',
                    'each key once'),
     'number in quotes': ('a: 10', 'a: "10"', 21, f'{ROW_0}, field a', "the text '10'", NUMBER_MM),
     'not a number': ('d: 20', 'd: .nan', 21, f'{ROW_0}, field d', "'.nan'", NUMBER_MM),
@@ -196,11 +196,11 @@ MISTAKES = {
                     NUMBER_DEG),
     'digits of another script': ('d: 20', 'd: \u0662\u0660', 21, f'{ROW_0}, field d',
                                  "'\u0662\u0660'", NUMBER_MM),
-    'expression': ('alpha: -90', 'alpha: -pi/2', 21, f'{ROW_0}, field alpha', "'-pi/2'",
+    'expression': ('alpha: -90', 'alpha: pi/0', 21, f'{ROW_0}, field alpha', "'pi/0'",
                    NUMBER_DEG),
     'number with a unit': ('offset: 90', 'offset: 90 deg', 21, f'{ROW_0}, field offset',
                            "'90 deg'", NUMBER_DEG),
-    'number with a comma': ('offset: 90', 'offset: 90,5', 21, ROW_0, "key '5'", LINK),
+    'number with a comma': ('offset: 90', 'offset: 90,5', 21, ROW_0, "unknown key '5'", LINK),
     'boolean': ('a: 10', 'a: yes', 21, f'{ROW_0}, field a', "'yes'", NUMBER_MM),
     'nothing': ('a: 10', 'a: ', 21, f'{ROW_0}, field a', 'nothing', NUMBER_MM),
     'null': ('a: 10', 'a: ~', 21, f'{ROW_0}, field a', "'~'", NUMBER_MM),
@@ -217,22 +217,28 @@ MISTAKES = {
     'range of a sliding joint': ('type: prismatic', 'type: prismatic, range: [x, 1]', 22,
                                  f'{ROW_1}, field range', "'x'", NUMBER_MM),
     'bad joint type': ('prismatic', 'screw', 22, f'{ROW_1}, field type', "'screw'",
-                       'revolute or prismatic'),
+                       'revolute or prismatic or fixed'),
     'joint type is a mapping': ('prismatic', '{}', 22, f'{ROW_1}, field type', 'a mapping',
-                                'revolute or prismatic'),
+                                'revolute or prismatic or fixed'),
     'erratum of several lines': ('"odd"', '"odd\\neven"', 22, f'{ROW_1}, field erratum',
                                  "the text 'odd\\neven'", 'text of one line'),
     'erratum that hides text': ('"odd"', '"odd\\u202e"', 22, f'{ROW_1}, field erratum',
                                 "the text 'odd\\u202e'", 'text of one line'),
     'erratum is a list': ('"odd"', '[odd]', 22, f'{ROW_1}, field erratum', 'a list',
                           'text of one line'),
-    'virtual link with a range': ('{a: 1, d: 6.6', '{range: [0, 1], a: 1, d: 6.6', 23,
-                                  f'{V1}, field virtual_link', "key 'range'", DH),
-    'virtual link without a cell': ('{a: 1, d: 6.6', '{d: 6.6', 23,
-                                    f'{V1}, field virtual_link, field a', 'nothing',
-                                    f'all of {DH}'),
-    'virtual link with a word': ('{a: 1, d: 6.6', '{a: 1, d: far', 23,
-                                 f'{V1}, field virtual_link, field d', "'far'", NUMBER_MM),
+    'fixed row with a range': ('{a: 1, d: 6.6', '{range: [0, 1], a: 1, d: 6.6', 23,
+                               f'{V1}, row 2, field range', 'a list',
+                               'nothing, since a fixed row has no joint'),
+    'sign of two': ('offset: 90', 'offset: 90, sign: 2', 21, f'{ROW_0}, field sign', "'2'",
+                    '1 or +1 or -1'),
+    'robot range reversed': ('[-44, 132]', '[-44, 132], robot_range: [1, 0]', 21,
+                             f'{ROW_0}, field robot_range', "'1' above '0'",
+                             'lower at most upper'),
+    'virtual link of old': ('        T_nIs', '        virtual_link: {a: 1}\n        T_nIs', 14, V1,
+                            'key virtual_link', 'a last row of links instead, such as '
+                            '{a: 0, d: 6.6, alpha: 90, offset: 0, type: fixed}'),
+    'unknown convention': ('        T_nIs', '        convention: craig\n        T_nIs', 24,
+                           f'{V1}, field convention', "'craig'", 'standard or modified'),
     # --- YAML that has no place here
     'alias': ('a: 30', 'a: &a 30, d: *a, x: 1', 22, FILE, 'alias *a', 'plain values'),
     'merge key': ('{a: 30', '{<<: {d: 1}, a: 30', 22, ROW_1, "'<<'", f'a name: {NAME}'),
@@ -274,19 +280,19 @@ def test_a_mistake_is_one_line_with_place_found_and_allowed(kind: str, tmp_path:
 def test_the_good_file_is_read(tmp_path: Path) -> None:
     for content in (GOOD, '\ufeff' + GOOD, GOOD.replace('\n', '\r\n'), '--- # one\n' + GOOD):
         chain = Catalog.load(write(tmp_path, content)).chain('leg', 'v1', 'sole')
-        assert [link.d for link in chain.links] == [0.02, 0.04]
+        assert [link.d for link in chain.links] == [0.02, 0.04, 0.0066]
         assert chain.T_root_0[0, 3] == 0.005
 
 
 @pytest.mark.usefixtures('_loader')
 @pytest.mark.parametrize(('content', 'line', 'found'), [
-    ('a: [1, 2\nb: 3}', 2, 'no YAML: .*'),
-    ('a:\n\tb: 1\n', 2, 'no YAML: found character .*that cannot start any token'),
-    ('a: b: c\n', 1, 'no YAML: mapping values are not allowed .*'),
-    ('a: "b\n\n', 3, 'no YAML: .*end of stream.*'),
-    ('a: 1\n b: 2\n', 2, 'no YAML: .*'),
-    ('%YAML 9.9\n---\na: 1\n', 1, 'no YAML: .*incompatible.*'),
-    ('a: "\\q"\n', 1, 'no YAML: .*escape character.*'),
+    ('a: [1, 2\nb: 3}', 2, 'text that is not YAML: .*'),
+    ('a:\n\tb: 1\n', 2, 'text that is not YAML: found character .*that cannot start any token'),
+    ('a: b: c\n', 1, 'text that is not YAML: mapping values are not allowed .*'),
+    ('a: "b\n\n', 3, 'text that is not YAML: .*end of stream.*'),
+    ('a: 1\n b: 2\n', 2, 'text that is not YAML: .*'),
+    ('%YAML 9.9\n---\na: 1\n', 1, 'text that is not YAML: .*incompatible.*'),
+    ('a: "\\q"\n', 1, 'text that is not YAML: .*escape character.*'),
 ])
 def test_what_is_no_yaml_names_the_line(
         content: str, line: int, found: str, tmp_path: Path) -> None:

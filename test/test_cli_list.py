@@ -16,7 +16,7 @@ def test_the_text_names_chains_versions_joints_and_tip_frames():
     for words in ('l_hip_pitch  l_hip_roll  l_hip_yaw  l_knee  l_ankle_pitch  l_ankle_roll',
                   'dh: l_foot_dh_frame', 'sole: r_sole', 'dh: imu_frame', 'v2_5'):
         assert words in text
-    assert text.count('v3  (iKin, versions from 3.0 on; not in the printed documentation)') == 2
+    assert text.count('v3  (iKin, versions from 3.0 on, in the root frame of iCubGenova09') == 2
     assert max(map(len, text.splitlines()[1:])) <= 100
 
 

@@ -98,7 +98,7 @@ def test_the_text_shows_matrix_position_and_quaternion():
 
 
 def test_a_joint_outside_its_range_is_noted_and_not_clamped():
-    done = leg_fk('pose', 'left_leg', '--degrees', 0, 30, 0, 0, 0, 0)
+    done = leg_fk('pose', 'left_leg', '--version', 'v1', '--degrees', 0, 30, 0, 0, 0, 0)
     assert done.returncode == 0
     note = ' '.join(done.stdout[done.stdout.index('note:'):].split())
     assert 'l_hip_roll = 30 deg is outside its documented range -119 .. 17 deg' in note
@@ -120,7 +120,8 @@ def test_a_joint_outside_its_range_is_noted_and_not_clamped():
     (['left_leg', '--degrees', *ZEROS[:5], '1e999'], "found '1e999', allowed: finite numbers"),
     (['--degrees', *ZEROS, 'left_leg'], "found 'left_leg', allowed: finite numbers"),
     (['left_arm', '--degrees', *ZEROS], "'left_arm'; known: left_leg, right_leg, head_imu"),
-    (['left_leg', '--version', 'V2_5', '--degrees', *ZEROS], "'V2_5'; known: v1, v2_5, v3"),
+    (['left_leg', '--version', 'V2_5', '--degrees', *ZEROS],
+     "'V2_5'; did you mean 'v2_5'? known: v1, v2_5, v3"),
     (['head_imu', '--degrees', *ZEROS], 'give --version; known: v2'),
     (['head_imu', '--version', 'v2', '--foot-frame', 'sole', '--degrees', *ZEROS], 'known: dh'),
     ([*ARM, '--degrees', '0', '1e308', '0'], "found '1e308', allowed: finite numbers up to 1e+09"),

@@ -129,7 +129,7 @@ def test_the_steps_are_walked_in_order():
 
 @pytest.mark.parametrize(('words', 'complaint'), [
     ([], 'CHAIN'),
-    (['left_foot'], "unknown chain: 'left_foot'; known: left_leg, right_leg, head_imu"),
+    (['left_foot'], "unknown chain 'left_foot'; known: left_leg, right_leg, head_imu"),
     (['left_leg', '--version', 'v4'], 'known: v1, v2_5, v3'),
     (['left_leg', '--foot-frame', 'toe'], 'known: dh, sole'),
     (['left_leg', '--degrees', '1', '2'], 'found 2, allowed: 6, in the order l_hip_pitch'),

@@ -34,9 +34,9 @@ def evaluator(e):
 @every_chain
 def test_the_formula_gives_the_chains_pose_everywhere(words, chain):
     formula = evaluator(json.loads(explain(*words, '--symbolic', '--json')))
-    for q in np.random.default_rng(5).uniform(-3, 3, (50, len(chain.links))):
+    for q in np.random.default_rng(5).uniform(-3, 3, (50, chain.n)):
         in_mm = [1000 * x if link.is_prismatic else x
-                 for x, link in zip(q, chain.links, strict=True)]
+                 for x, link in zip(q, chain.joints, strict=True)]
         assert np.abs(in_metres(formula(in_mm)) - chain.forward(q)).max() < 1e-12
 
 
@@ -49,7 +49,7 @@ def test_the_sum_of_joints_1_and_2_is_not_joint_12(tmp_path):
     formula = evaluator(e)
     for q in np.random.default_rng(6).uniform(-3, 3, (20, 13)):
         in_mm = [1000 * x if link.is_prismatic else x
-                 for x, link in zip(q, chain.links, strict=True)]
+                 for x, link in zip(q, chain.joints, strict=True)]
         assert np.abs(in_metres(formula(in_mm)) - chain.forward(q)).max() < 1e-12
 
 

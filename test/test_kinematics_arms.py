@@ -81,7 +81,7 @@ def stanford(t1: float, t2: float, d3: float, t4: float, t5: float, t6: float) -
 
 def check(chain: Chain, Q: np.ndarray, expected: np.ndarray) -> None:
     assert np.abs(np.array([chain.forward(q) for q in Q]) - expected).max() < 1e-12
-    assert np.abs(chain.forward_many(Q) - expected).max() < 1e-12
+    assert np.abs(chain.forward(Q) - expected).max() < 1e-12
     positions = np.array([chain.pose(q)[:3] for q in Q.tolist()])
     assert np.abs(positions - expected[:, :3, 3]).max() < 1e-12
 

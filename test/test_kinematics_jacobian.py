@@ -15,7 +15,7 @@ def mixed_arm() -> Chain:
     return Chain(name='mixed', version='', root_frame='base', tip='hand', tip_frame='hand',
                  joint_names=tuple('abcde'), links=links,
                  T_root_0=CATALOG.chain('head_imu', 'v2').T_root_0,
-                 virtual_link=DHLink(a=0.2, d=-0.1, alpha=0.7, offset=0.3))
+                 T_n_tip=DHLink(a=0.2, d=-0.1, alpha=0.7, offset=0.3).transform())
 
 
 ARMS = [CATALOG.chain(name, version) for name, entry in CATALOG.chains.items()

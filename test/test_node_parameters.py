@@ -155,7 +155,7 @@ def test_kinematics_file_with_other_chains_needs_them_named_at_once(shared, feet
     file.write_text(ARM)
     result = robot.change(kinematics_file=str(file))
     assert not result.successful
-    assert "unknown chain: 'left_leg'; known: arm" in result.reason
+    assert "unknown chain 'left_leg'; known: arm" in result.reason
     result = robot.change(kinematics_file=str(file), chains=['arm'], version='a')
     assert result.successful, result.reason
     hand = robot.listen(PoseStamped, node.topic('hand/pose'))

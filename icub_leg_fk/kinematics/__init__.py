@@ -1,14 +1,15 @@
 """ROS-free kinematics: DH links, chains, rotations and the catalog of tables.
 
 Transforms are `T_a_b`, taking coordinates in b to coordinates in a; lengths are metres, angles
-radians, quaternions (x, y, z, w) with w >= 0.
+radians, quaternions (x, y, z, w).
 """
 
-from icub_leg_fk.kinematics.catalog import Catalog, config_file
+from icub_leg_fk.kinematics.catalog import Catalog, config_file, load_chain
 from icub_leg_fk.kinematics.chain import Chain
 from icub_leg_fk.kinematics.link import DHLink
 from icub_leg_fk.kinematics.rotation import matrix_to_quaternion, quaternion_to_matrix
 
 __all__ = [
-    'Catalog', 'Chain', 'DHLink', 'config_file', 'matrix_to_quaternion', 'quaternion_to_matrix',
+    'Catalog', 'Chain', 'DHLink', 'config_file', 'load_chain', 'matrix_to_quaternion',
+    'quaternion_to_matrix',
 ]

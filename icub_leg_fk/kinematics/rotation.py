@@ -1,8 +1,9 @@
-"""Rotations: unit quaternions in ROS order (x, y, z, w) with w >= 0, and exact right angles."""
+"""Rotations: unit quaternions in ROS order (x, y, z, w), and exact right angles."""
 
 from __future__ import annotations
 
 import math
+from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,18 +11,35 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 _QUADRANTS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
+_RIGHT = 1e-15  # quarter turns from a right angle that are rounding
+_LIKELY = 1e-6  # components of a unit quaternion that differ by less may be equal but for rounding
 
 
-def cos_sin(angle: float) -> tuple[float, float]:
-    """Return cosine and sine of an angle [rad], exact at every multiple of a right angle.
+@overload
+def cos_sin(angle: float) -> tuple[float, float]: ...
+
+
+@overload
+def cos_sin(angle: Array) -> tuple[Array, Array]: ...
+
+
+def cos_sin(angle: float | Array) -> tuple[float, float] | tuple[Array, Array]:
+    """Return cosine and sine of angles [rad], exact at every multiple of a right angle.
 
     DH tables are full of right angles; cos(pi/2) must be 0 there and not 6e-17.
     """
-    quarter_turns = angle / (math.pi / 2)
-    nearest = round(quarter_turns)
-    if abs(quarter_turns - nearest) < 1e-15 * max(1, abs(nearest)):
-        return _QUADRANTS[nearest % 4]
-    return math.cos(angle), math.sin(angle)
+    if isinstance(angle, float):
+        quarter_turns = angle / (math.pi / 2)
+        nearest = round(quarter_turns)
+        if abs(quarter_turns - nearest) < _RIGHT * max(1, abs(nearest)):
+            return _QUADRANTS[nearest % 4]
+        return math.cos(angle), math.sin(angle)
+    turns = angle / (math.pi / 2)
+    whole = np.rint(turns)
+    right = np.abs(turns - whole) < _RIGHT * np.maximum(1, np.abs(whole))
+    exact = np.array(_QUADRANTS)[np.mod(whole, 4).astype(int)]
+    return (np.where(right, exact[..., 0], np.cos(angle)),
+            np.where(right, exact[..., 1], np.sin(angle)))
 
 
 def matrix_to_quaternion(rotation: ArrayLike) -> Array:
@@ -71,6 +89,23 @@ def canonical_quaternion(quaternion: ArrayLike) -> Array:
     return np.asarray(np.where(leading[..., None] < 0, -q, q) + 0.0)
 
 
+def reference_quaternion(quaternion: ArrayLike) -> Array:
+    """Return the one of q and -q from which the signs of a tip's other orientations are measured.
+
+    It has w > 0 or, where w is 0 but for rounding, its largest component positive, the first of
+    x, y, z that are equal but for rounding.
+
+    Args:
+        quaternion: (4,) unit quaternion x, y, z, w of the tip at q = 0.
+    """
+    q = np.array(quaternion, dtype=float)
+    leading = q[3]
+    if abs(leading) < _LIKELY:
+        size = np.abs(q[:3])
+        leading = q[np.argmax(size > size.max() - _LIKELY)]
+    return -q if leading < 0 else q
+
+
 def quaternion_to_matrix(quaternion: ArrayLike) -> Array:
     """Convert unit quaternions to rotation matrices.
 
@@ -92,7 +127,12 @@ def quaternion_to_matrix(quaternion: ArrayLike) -> Array:
 
 
 def is_rigid_transform(T: Array, tolerance: float = 1e-6) -> bool:
-    """Tell whether a (4, 4) matrix is a proper rotation and a translation, and nothing else."""
+    """Tell whether a (4, 4) matrix is a proper rotation and a translation, and nothing else.
+
+    Args:
+        T: the matrix.
+        tolerance: how far R R^T may be from the identity.
+    """
     R = T[:3, :3]
     return bool(
         np.all(np.isfinite(T))

@@ -9,7 +9,6 @@ from typing import Any
 
 from icub_leg_fk.errors import LegFKError, ParameterError
 from icub_leg_fk.kinematics import Catalog, Chain
-from icub_leg_fk.kinematics.catalog import FOOT_FRAMES
 
 STAMP_SOURCES = ('message', 'now')
 DEFAULT_TIMEOUT = 0.5  # s
@@ -56,7 +55,9 @@ class Configuration:
         if not names or len(set(names)) != len(names):
             raise ParameterError(f'parameter chains: found {list(names or ())}, allowed: one or '
                                  f'more of {", ".join(catalog.chains)}, each once')
-        _check_choice('foot_frame', values['foot_frame'], FOOT_FRAMES)
+        known = {frame: None for entry in catalog.chains.values()
+                 for version in entry.versions.values() for frame in version.tip_frames}
+        _check_choice('foot_frame', values['foot_frame'], tuple(known))
         _check_choice('stamp_source', values['stamp_source'], STAMP_SOURCES)
         timeout, prefix = values['joint_timeout'], values['frame_prefix']
         if not 0.0 <= timeout <= LONGEST_TIMEOUT:
@@ -74,9 +75,9 @@ class Configuration:
         chains = tuple(_chain(name, values, catalog) for name in names)
         return cls(
             chains=chains,
-            notes=tuple(f'{chain.name} has no sole; its pose is that of {prefix}{chain.tip_frame}'
-                        for chain in chains
-                        if values['foot_frame'] not in catalog.entry(chain.name).tip_frames),
+            notes=tuple(f'{chain.name} has no {values["foot_frame"]} frame; its pose is that of '
+                        f'{prefix}{chain.tip_frame}' for chain in chains if values['foot_frame']
+                        not in _tip_frames(catalog, chain.name, chain.version)),
             frame_prefix=prefix,
             joint_timeout=timeout,
             stamp_now=values['stamp_source'] == 'now',
@@ -100,10 +101,17 @@ def _check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
 def _chain(name: str, values: Mapping[str, Any], catalog: Catalog) -> Chain:
     parameter, own = 'chains', version_parameter(name)
     try:
-        entry = catalog.entry(name)
+        catalog.entry(name)
         parameter = 'version'
-        foot_frame = values['foot_frame'] if values['foot_frame'] in entry.tip_frames else 'dh'
-        return catalog.chain(name, values.get(own) or values['version'], foot_frame)
+        version = values.get(own) or values['version']
+        chain = catalog.chain(name, version)
+        if values['foot_frame'] in _tip_frames(catalog, name, version):
+            chain = catalog.chain(name, version, values['foot_frame'])
+        return chain
     except LegFKError as error:
         hint = f' (or set {own})' if parameter == 'version' else ''
         raise ParameterError(f'parameter {parameter}: {error}{hint}') from error
+
+
+def _tip_frames(catalog: Catalog, chain: str, version: str) -> tuple[str, ...]:
+    return tuple(catalog.entry(chain).versions[version].tip_frames)

@@ -105,9 +105,9 @@ def _picker(places: list[int]) -> Callable[[Fields], Fields]:
 def _bounds(name: str, chains: Sequence[Chain]) -> tuple[float, float]:
     """Return the range of a joint that every chain agrees with, without infinities."""
     links = [link for chain in chains
-             for joint, link in zip(chain.joint_names, chain.links, strict=True) if joint == name]
-    return (max(-_LARGEST, *(link.lower for link in links)),
-            min(_LARGEST, *(link.upper for link in links)))
+             for joint, link in zip(chain.joint_names, chain.joints, strict=True) if joint == name]
+    return (max(-_LARGEST, *(link.limits[0] for link in links)),
+            min(_LARGEST, *(link.limits[1] for link in links)))
 
 
 class JointStream:

@@ -130,7 +130,7 @@ class Outputs:
     def _pose_step(self, chain: Chain, configuration: Configuration,
                    send: Callable[[bytes], None]) -> OnReady:
         encode = PoseStampedEncoder(configuration.frame_prefix + chain.root_frame).encode
-        pose = chain.solver.pose
+        pose = chain.pose
 
         def publish_pose(sec: int, nanosec: int, q: Sequence[float],
                          qdot: Sequence[float] | None) -> None:
@@ -140,7 +140,7 @@ class Outputs:
     def _twist_step(self, index: int, chain: Chain, configuration: Configuration,
                     send: Callable[[bytes], None]) -> OnReady:
         encode = TwistStampedEncoder(configuration.frame_prefix + chain.root_frame).encode
-        twist = chain.twist_solver.twist
+        twist = chain.twist
 
         def publish_twist(sec: int, nanosec: int, q: Sequence[float],
                           qdot: Sequence[float] | None) -> None:

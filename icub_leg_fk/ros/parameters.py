@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 from icub_leg_fk.errors import LegFKError, ParameterError
 from icub_leg_fk.kinematics import Catalog
-from icub_leg_fk.kinematics.catalog import FOOT_FRAMES
 from icub_leg_fk.ros.configuration import (
     Configuration,
     DEFAULT_TIMEOUT,
@@ -52,7 +51,7 @@ _PARAMETERS = (
     _Parameter('kinematics_file', '', 'Kinematics file to read; empty is the shipped one.',
                'path of a YAML file'),
     _Parameter('foot_frame', 'dh', "Axes of the tip: the table's last frame, or the sole.",
-               ' or '.join(FOOT_FRAMES)),
+               'a tip frame of the kinematics file, such as dh or sole'),
     _Parameter('frame_prefix', '', 'Put before every frame id.', 'printable, no space'),
     _Parameter('joint_timeout', DEFAULT_TIMEOUT, 'Age of a joint beside the newest of its chain '
                'above which the chain is held back [s]; 0 turns this off.', '', LONGEST_TIMEOUT),

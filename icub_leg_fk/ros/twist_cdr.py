@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-from icub_leg_fk.kinematics.twist_solver import Twist
+from icub_leg_fk.kinematics.solver import Twist
 from icub_leg_fk.ros.pose_cdr import aligned, ENCAPSULATION, STAMP_SIZE, string
 
 

@@ -129,11 +129,11 @@ def joint_positions(args: argparse.Namespace, chain: Chain) -> list[float] | Non
     given: Sequence[float] | None = args.radians if args.degrees is None else args.degrees
     if given is None:
         return None
-    if len(given) != len(chain.links):
+    if len(given) != chain.n:
         raise JointVectorError(
-            f'joint positions: found {len(given)}, allowed: {len(chain.links)}, in the order '
+            f'joint positions: found {len(given)}, allowed: {chain.n}, in the order '
             f'{" ".join(chain.joint_names)}')
     if args.degrees is None:
         return list(given)
     return [value if link.is_prismatic else math.radians(value)
-            for value, link in zip(given, chain.links, strict=True)]
+            for value, link in zip(given, chain.joints, strict=True)]

@@ -3,7 +3,8 @@
 The pelvis stays level and moves forward at constant speed, swaying over the standing foot and
 bobbing a little; a foot stands still on the ground or swings to its next place along a
 minimum-jerk curve. Seen from the root, both soles repeat the same cycle, half a period apart.
-The root frame has x backward, y to the robot's right and z up.
+At q = 0 the soles are level and their x points forward, whichever way the root frame is turned
+about its z (it has x backward, but forward on the iCub 3).
 """
 
 from __future__ import annotations
@@ -17,17 +18,16 @@ from numpy.polynomial import Polynomial
 
 PERIOD = 1.25  # s, two steps
 STANCE = 0.6  # share of the period a foot stands; above 0.5 both feet stand for a while
-STEP = 0.13  # m from one foot's place to the other's
-LIFT = 0.045  # m of the swing foot above the ground
+STEP = 0.12  # m from one foot's place to the other's
+LIFT = 0.04  # m of the swing foot above the ground
 SWAY = 0.03  # m of the pelvis to each side
 BOB = 0.004  # m of the pelvis up and down
-KNEE = np.radians(-44.0)  # of the posture around which the robot walks
+KNEE = np.radians(-34.0)  # of the posture around which the robot walks
 HIP_ROLL_LIMIT = np.radians(17.0)  # the printed -119 .. 17 has a sign slip: both ends are near 17
 
 # Minimum jerk (Flash and Hogan, J. Neuroscience 5, 1985) and a bump as smooth, over 0..1.
 _SWING = Polynomial([0, 0, 0, 10, -15, 6])
 _BUMP = 64 * Polynomial([0, 1]) ** 3 * Polynomial([1, -1]) ** 3
-_LEVEL_SOLE = np.diag([-1.0, -1.0, 1.0])  # x forward, y left, z up, in the root frame
 
 
 def walk(catalog: Catalog, version: str, seconds: float = 10.0,
@@ -57,8 +57,7 @@ def walk(catalog: Catalog, version: str, seconds: float = 10.0,
     count = max(1, round(seconds * rate))
     rows = np.arange(count) % samples
     return JointRecording(
-        joint_names=(*catalog.entry('left_leg').joint_names,
-                     *catalog.entry('right_leg').joint_names),
+        joint_names=(*left_leg.joint_names, *right_leg.joint_names),
         times=np.arange(count) / rate,
         positions=np.hstack((left[0], right[0]))[rows],
         velocities=np.hstack((left[1], right[1]))[rows])
@@ -68,9 +67,10 @@ def _leg_cycle(chain: Chain, standing: Array, phases: Array,
                period: float) -> tuple[Array, Array]:
     """Return the (N, 6) joint positions [rad] and velocities [rad/s] of one leg's cycle."""
     q = _posture(chain)
+    level = chain.forward(np.zeros(chain.n))[:3, :3]
     positions, velocities = [], []
-    for p, v in zip(*_sole_path(standing, phases, period), strict=True):
-        q = _solve(chain, p, q)
+    for p, v in zip(*_sole_path(standing, level[0, 0], phases, period), strict=True):
+        q = _solve(chain, p, level, q)
         positions.append(q)
         velocities.append(np.linalg.solve(chain.jacobian(q), np.append(v, np.zeros(3))))
     for sample in positions:
@@ -83,17 +83,18 @@ def _leg_cycle(chain: Chain, standing: Array, phases: Array,
 
 def _posture(chain: Chain) -> Array:
     """Return the joint positions around which the leg walks: knee bent, sole level."""
-    hip_roll = chain.links[1]
+    hip_roll = chain.joints[1]
     room = np.radians(6.0)  # for the sway
     roll = float(np.clip(0.0, hip_roll.lower + room, min(hip_roll.upper, HIP_ROLL_LIMIT) - room))
     return np.array([-KNEE / 2, roll, 0.0, KNEE, KNEE / 2, -roll])
 
 
-def _sole_path(standing: Array, phases: Array, period: float) -> tuple[Array, Array]:
+def _sole_path(standing: Array, ahead: float, phases: Array, period: float) -> tuple[Array, Array]:
     """Plan one cycle; the foot stands in phases 0 to STANCE and swings from there to 1.
 
     Args:
         standing: (3,) place of the sole around which it moves [m].
+        ahead: 1 if x of the root frame points forward, -1 if backward.
         phases: (N,) phases, in periods.
         period: duration of a cycle [s].
 
@@ -107,21 +108,21 @@ def _sole_path(standing: Array, phases: Array, period: float) -> tuple[Array, Ar
     around = 2 * np.pi * (phase - STANCE / 2)  # 0 at mid-stance
 
     # In the world a foot advances by two steps a period, all of it while it swings, and the
-    # pelvis by as much, evenly; forward is -x. A pelvis moving one way is a foot moving back.
-    x = 2 * STEP * (phase - STANCE / 2 - _SWING(swing))
-    dx = 2 * STEP * (1 - _SWING.deriv()(swing) * swing_rate)
+    # pelvis by as much, evenly. A pelvis moving one way is a foot moving back.
+    x = -ahead * 2 * STEP * (phase - STANCE / 2 - _SWING(swing))
+    dx = -ahead * 2 * STEP * (1 - _SWING.deriv()(swing) * swing_rate)
     y, dy = -side * SWAY * np.cos(around), side * SWAY * np.sin(around) * 2 * np.pi
     z = LIFT * _BUMP(swing) - BOB * np.cos(2 * around)
     dz = LIFT * _BUMP.deriv()(swing) * swing_rate + BOB * np.sin(2 * around) * 4 * np.pi
     return standing + np.stack((x, y, z), axis=1), np.stack((dx, dy, dz), axis=1) / period
 
 
-def _solve(chain: Chain, position: Array, start: Array) -> Array:
+def _solve(chain: Chain, position: Array, level: Array, start: Array) -> Array:
     """Return joint positions with a level sole at a position, by damped least squares."""
     q = start
     for _ in range(50):
         T = chain.forward(q)
-        turn = np.cross(T[:3, :3].T, _LEVEL_SOLE.T).sum(axis=0) / 2
+        turn = np.cross(T[:3, :3].T, level.T).sum(axis=0) / 2
         error = np.append(position - T[:3, 3], turn)
         if np.abs(error).max() < 1e-12:
             return q

@@ -8,7 +8,7 @@ from typing import Any, TYPE_CHECKING
 from icub_leg_fk.tools.chain_arguments import add_json, add_kinematics_file
 
 if TYPE_CHECKING:
-    from icub_leg_fk.kinematics.catalog_file import ChainEntry
+    from icub_leg_fk.kinematics.catalog import ChainEntry
 
 HELP = 'list the chains: versions, joints, tip frames'
 EXAMPLES = """\
@@ -45,24 +45,26 @@ def _as_text(entry: ChainEntry) -> list[str]:
     from icub_leg_fk.tools.text import columns, indented
 
     sources = {name: version.source for name, version in entry.versions.items()}
-    rows = [['tip', f'{entry.tip}, in {entry.root_frame}']]
+    place = next(iter(entry.versions.values()))
+    rows = [['tip', f'{entry.tip}, in {place.root_frame}']]
     rows += [['tip frames' if i == 0 else '', f'{name}: {tip.frame}']
-             for i, (name, tip) in enumerate(entry.tip_frames.items())]
+             for i, (name, tip) in enumerate(place.tip_frames.items())]
     rows += [['versions' if i == 0 else '', f'{name}  ({source})' if source else name]
              for i, (name, source) in enumerate(sources.items())]
-    names = entry.joint_names
+    names = place.joint_names
     rows += [['joints' if i == 0 else '', '  '.join(names[i:i + 6])]
              for i in range(0, len(names), 6)]
     return [entry.name, *indented(columns(rows))]
 
 
 def _as_json(entry: ChainEntry) -> dict[str, Any]:
+    place = next(iter(entry.versions.values()))
     return {
         'name': entry.name,
         'tip': entry.tip,
-        'root_frame': entry.root_frame,
-        'joints': list(entry.joint_names),
-        'tip_frames': {name: tip.frame for name, tip in entry.tip_frames.items()},
+        'root_frame': place.root_frame,
+        'joints': list(place.joint_names),
+        'tip_frames': {name: tip.frame for name, tip in place.tip_frames.items()},
         'versions': [
             {'name': name, 'source': version.source,
              'joint_types': [link.joint_type for link in version.links]}

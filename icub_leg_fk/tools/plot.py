@@ -89,7 +89,8 @@ def run(args: argparse.Namespace) -> int:
     instants = _checked(args.at, tracks) if args.at else telling_instants(tracks)
     versions = dict.fromkeys(chain.version for chain in chains)
     title = f'{args.input.resolve().name}   {", ".join(versions)}'
-    soled = [chain.name for chain in chains if 'sole' in catalog.entry(chain.name).tip_frames]
+    soled = [chain.name for chain in chains
+             if 'sole' in catalog.entry(chain.name).versions[chain.version].tip_frames]
     save_picture(lambda: feet_figure(tracks, instants, title, soled), output)
     poses = ', '.join(f'{len(track.times)} poses of {track.chain.tip}' for track in tracks)
     print(f'{output}: {poses}')

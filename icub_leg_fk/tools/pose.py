@@ -67,7 +67,7 @@ def _as_text(chain: Chain, q: list[float], T: Array, quaternion: Array) -> list[
     )
 
     outside = chain.out_of_range(q)
-    joints = list(zip(chain.joint_names, chain.links, q, strict=True))
+    joints = list(zip(chain.joint_names, chain.joints, q, strict=True))
     table = columns([
         [name, *position_text(link, value).split(),
          f'documented {range_text(link)}' if range_text(link) else '',

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
 from icub_leg_fk.errors import LegFKError
-from icub_leg_fk.kinematics.catalog_file import ChainEntry, ChainVersion
+from icub_leg_fk.kinematics.catalog import ChainEntry, ChainVersion
 from icub_leg_fk.kinematics.link import DHLink
 from icub_leg_fk.kinematics.rotation import Array
 import numpy as np
@@ -49,7 +49,7 @@ def urdf_text(robot: str, selections: Sequence[Selection]) -> str:
         LegFKError: the chains have different roots or share a name, or a prismatic joint has no
             range, which a URDF must state.
     """
-    root_frames = {selection.entry.root_frame for selection in selections}
+    root_frames = {selection.table.root_frame for selection in selections}
     if len(root_frames) > 1:
         raise LegFKError(f'a URDF has one root: found {", ".join(sorted(root_frames))}; choose '
                          'chains with the same root_frame')
@@ -86,17 +86,20 @@ def xyz_rpy(T: Array) -> tuple[Array, Array]:
 
 def _chain(selection: Selection) -> Iterator[ET.Element]:
     entry, table = selection.entry, selection.table
-    origin, parent = table.T_root_0, entry.root_frame
-    for name, link in zip(entry.joint_names, table.links, strict=True):
+    origin, parent = table.T_root_0, table.root_frame
+    names = iter(table.joint_names)
+    for link in table.links:
+        if link.is_fixed:
+            origin = origin @ link.transform()
+            continue
+        name = next(names)
         yield _joint(entry.name, name, link, origin, parent)
         origin, parent = link.transform(), f'{name}_link'
         element = ET.Element('link', name=parent)
         _ball(element, 'joint', JOINT_RADIUS)
         _bone(element, origin[:3, 3])
         yield element
-    if table.virtual_link is not None:
-        origin = origin @ table.virtual_link.transform()
-    dh, sole = entry.tip_frames['dh'], entry.tip_frames.get('sole')
+    dh, sole = table.tip_frames['dh'], table.tip_frames.get('sole')
     yield _fixed(f'{dh.frame}_joint', origin @ table.T_n_tip, parent, dh.frame)
     tip = ET.Element('link', name=dh.frame)
     yield tip
@@ -111,7 +114,7 @@ def _chain(selection: Selection) -> Iterator[ET.Element]:
 
 
 def _joint(chain: str, name: str, link: DHLink, origin: Array, parent: str) -> ET.Element:
-    documented = math.isfinite(link.lower)
+    documented = math.isfinite(link.limits[0])
     if link.is_prismatic and not documented:
         raise LegFKError(f'chain {chain}, joint {name}: found no range, allowed: one, since a '
                          'URDF must limit a prismatic joint')
@@ -120,9 +123,9 @@ def _joint(chain: str, name: str, link: DHLink, origin: Array, parent: str) -> E
     _place(joint, origin, parent, f'{name}_link')
     ET.SubElement(joint, 'axis', xyz='0 0 1')
     if link.erratum:
-        _comment(joint, f'Range as printed, known erratum: {link.erratum}')
+        _comment(joint, f'Erratum of the printed table: {link.erratum}')
     if documented:
-        ET.SubElement(joint, 'limit', lower=repr(link.lower), upper=repr(link.upper),
+        ET.SubElement(joint, 'limit', lower=repr(link.limits[0]), upper=repr(link.limits[1]),
                       effort=EFFORT, velocity=VELOCITY)
     return joint
 

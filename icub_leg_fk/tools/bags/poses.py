@@ -1,9 +1,7 @@
 """Adds foot poses to the messages of a bag, by the node's own rules and with its own code.
 
 Each JointState goes through `JointStream`, as in the node, and every pose lands right behind the
-message that gave it. The joint vectors of a block are collected and computed together, by
-`Chain.poses_as_one_by_one` and `TwistSolver.twists`, which give to the bit what the node's
-`Chain.pose` and `Chain.twist` give.
+message that gave it. Poses come from the node's own `Chain.pose` and `Chain.twist`.
 """
 
 from __future__ import annotations
@@ -20,7 +18,6 @@ from icub_leg_fk.ros.pose_cdr import PoseStampedEncoder
 from icub_leg_fk.ros.twist_cdr import TwistStampedEncoder
 from icub_leg_fk.tools.bags.cdr import TransformEncoder
 from icub_leg_fk.tools.bags.topics import Message, new_topic, POSE, TF, Topic, TWIST
-import numpy as np
 
 NODE = '/foot_pose_publisher'
 TF_TOPIC = '/tf'
@@ -136,7 +133,7 @@ class _ChainOutput:
             return 0
         ready = self.ready[:]
         self.ready.clear()
-        poses = self._chain.poses_as_one_by_one([item[4] for item in ready]).tolist()
+        poses = [self._chain.pose(item[4]) for item in ready]
         topic, encode = self._pose_topic, self._encode_pose
         added[topic] += len(ready)
         for (place, time, sec, nanosec, _, _), pose in zip(ready, poses):
@@ -155,9 +152,8 @@ class _ChainOutput:
     def _fill_twists(self, ready: Sequence[_Ready], block: list[Message | None]) -> int:
         moving = [item for item in ready if item[5] is not None]
         if moving:
-            twists = self._chain.twist_solver.twists(
-                np.array([item[4] for item in moving]), np.array([item[5] for item in moving]))
+            twists = [self._chain.twist(item[4], item[5] or ()) for item in moving]
             topic, encode = self._twist_topic, self._encode_twist
-            for (place, time, sec, nanosec, _, _), twist in zip(moving, twists.tolist()):
+            for (place, time, sec, nanosec, _, _), twist in zip(moving, twists):
                 block[place + 1] = (topic, 0, time, time, encode(sec, nanosec, twist))
         return len(ready) - len(moving)

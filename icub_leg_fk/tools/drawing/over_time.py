@@ -36,7 +36,7 @@ class Violation:
 def violations(track: ChainTrack) -> list[Violation]:
     """Return where a chain's joints are outside their documented ranges."""
     found = []
-    for name, link, q in zip(track.chain.joint_names, track.chain.links, track.positions.T,
+    for name, link, q in zip(track.chain.joint_names, track.chain.joints, track.positions.T,
                              strict=True):
         for outside, sign, limit in ((q < link.lower, '<', link.lower),
                                      (q > link.upper, '>', link.upper)):

@@ -22,7 +22,7 @@ def explanation_json(e: Explanation) -> str:
         'joints': list(chain.joint_names),
         'joint_positions': None if e.q is None else [
             1000 * value if link.is_prismatic else value
-            for value, link in zip(e.q, chain.links, strict=True)],
+            for value, link in zip(e.q, chain.joints, strict=True)],
         'symbols': {name: str(meaning) for name, meaning in e.symbols.items()},
         'frames': [{'origin': T[:3, 3].tolist(), 'x': T[:3, 0].tolist(), 'y': T[:3, 1].tolist(),
                     'z': T[:3, 2].tolist()} for T in e.frames + 0.0],

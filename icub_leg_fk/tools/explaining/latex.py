@@ -69,7 +69,7 @@ def _heading(e: Explanation) -> str:
         lines.append(f'Table from: {_words(e.source)}.')
     if e.q is not None:
         values = [f'{name} {position_text(link, value)}' for name, link, value
-                  in zip(chain.joint_names, chain.links, e.q, strict=True)]
+                  in zip(chain.joint_names, chain.joints, e.q, strict=True)]
         lines.append(f'Joint positions: {_words(", ".join(values))}.')
     return '\n'.join(lines)
 

@@ -7,14 +7,14 @@ An entry of a matrix is a float, or a sympy expression where the answer is to be
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 import math
 from typing import Any, Protocol
 
 from icub_leg_fk.kinematics import Chain
-from icub_leg_fk.kinematics.catalog_file import ChainEntry
+from icub_leg_fk.kinematics.catalog import ChainEntry
 from icub_leg_fk.kinematics.link import DHLink
 from icub_leg_fk.kinematics.rotation import Array, cos_sin
 import numpy as np
@@ -151,7 +151,7 @@ def explanation(entry: ChainEntry, chain: Chain, foot_frame: str, q: Sequence[fl
         tips.append((f'T_n{tip}', algebra.matrix(version.T_n_tip)))
     if foot_frame != 'dh':
         tips.append((f'T_{tip}{sole}',
-                     algebra.matrix(entry.tip_frames[foot_frame].T_dh_tip)))
+                     algebra.matrix(version.tip_frames[foot_frame].T_dh_tip)))
         tip = sole
     T_root_0 = algebra.matrix(chain.T_root_0)
     T_root_tip = product(T_root_0, steps[-1].T_0)
@@ -188,12 +188,12 @@ def basic_transforms(theta: tuple[Cell, Cell], d: Cell, a: Cell, alpha: tuple[Ce
 
 
 def _steps(chain: Chain, q: Sequence[float] | None, algebra: Algebra) -> list[Step]:
-    rows = [Row(i, joint, link)
-            for i, (joint, link) in enumerate(zip(chain.joint_names, chain.links, strict=True))]
-    positions: list[float | None] = [None] * len(rows) if q is None else list(q)
-    if chain.virtual_link is not None:
-        rows.append(Row(len(rows), '', chain.virtual_link))
-        positions.append(0.0)
+    names = iter(chain.joint_names)
+    given: Iterator[float | None] = iter([None] * chain.n if q is None else q)
+    rows, positions = [], []
+    for i, link in enumerate(chain.links):
+        rows.append(Row(i, '' if link.is_fixed else next(names), link))
+        positions.append(0.0 if link.is_fixed else next(given))
     steps = []
     for row, position in zip(rows, positions, strict=True):
         theta, d, a, alpha = algebra.values(row, position)
@@ -208,11 +208,9 @@ def _steps(chain: Chain, q: Sequence[float] | None, algebra: Algebra) -> list[St
 
 
 def _frames(chain: Chain, q: Sequence[float] | None) -> Array:
-    """Return frames 0 to n, the virtual link's included, in the root frame [mm]."""
-    frames = list(chain.frames([0.0] * len(chain.links) if q is None else q)[:-1])
-    if chain.virtual_link is not None:
-        frames.append(frames[-1] @ chain.virtual_link.transform())
-    in_mm: Array = np.array(frames) * (1, 1, 1, 1000)
+    """Return frames 0 to m in the root frame [mm]."""
+    frames = chain.frames([0.0] * chain.n if q is None else q)[:-1]
+    in_mm: Array = frames * (1, 1, 1, 1000)
     return in_mm
 
 

@@ -118,7 +118,7 @@ def _heading(e: Explanation) -> Lines:
         lines += ['Joint positions: symbols q_i. Lengths in mm.']
     else:
         values = [f'{name} {position_text(link, value)}' for name, link, value
-                  in zip(chain.joint_names, chain.links, e.q, strict=True)]
+                  in zip(chain.joint_names, chain.joints, e.q, strict=True)]
         lines += wrapped(f'Joint positions: {", ".join(values)}. Lengths in mm.')
     return lines
 
