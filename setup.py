@@ -8,15 +8,18 @@ PACKAGE = 'icub_leg_fk'
 SHARE = f'share/{PACKAGE}'
 
 ROS = ['ros-jazzy-common-interfaces', 'ros-jazzy-rclpy', 'ros-jazzy-rmw-fastrtps-cpp']
-TOOLS = ['lz4', 'matplotlib>=3.6', 'sympy', 'zstandard']
+TOOLS = ['argcomplete', 'matplotlib>=3.6', 'rosbags>=0.11.9,<0.12', 'sympy']
 TEST = [
     'colcon-common-extensions',
+    'distributed',
+    'example-robot-data',
     'hypothesis',
+    'icub-models',
     'mcap',
     'pin',
     'pytest>=7.4',
     'pytest-xdist',
-    'rosbags>=0.10',
+    'roboticstoolbox-python',
     'setuptools<80',
 ]
 LINT = [

@@ -64,6 +64,6 @@ def draw(report: Report, path: Path) -> None:
         axes.grid(alpha=0.25, linewidth=0.6)
         axes.legend(frameon=False, fontsize=8)
     fig.suptitle(report.machine, fontsize=8, color='#666666', x=0.01, ha='left')
-    with whole_file(path) as stream:
+    with whole_file(path, force=True) as stream:
         fig.savefig(stream, format='png', dpi=150)
     plt.close(fig)

@@ -69,7 +69,7 @@ class Report:
         write_text(path, json.dumps({
             'date': datetime.now(timezone.utc).isoformat(timespec='seconds'),
             'machine': self.machine, 'rows': self.rows, 'growth': growth,
-            'notes': self.notes}, indent=1) + '\n')
+            'notes': self.notes}, indent=1) + '\n', force=True)
 
     def broken_promises(self) -> list[str]:
         """Return the names of the rows whose promise does not hold."""

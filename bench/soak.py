@@ -50,7 +50,7 @@ def main() -> int:
         report['exit code'] = node.wait()
     failures = _failures(report)
     report['failures'] = failures
-    write_text(args.json, json.dumps(report, indent=1))
+    write_text(args.json, json.dumps(report, indent=1), force=True)
     _print(report)
     print(f'figures in {args.json}')
     print(f'not endured: {"; ".join(failures)}' if failures else 'endured')

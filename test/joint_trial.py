@@ -1,13 +1,12 @@
-"""Messages through the model, the plain input and streams with and without velocities."""
+"""Messages through the model of the rules and through the joint input, side by side."""
 
 from collections import Counter
 import math
 import struct
 
 from icub_leg_fk.errors import MalformedMessageError
+from icub_leg_fk.ros.cdr import decode_joint_state
 from icub_leg_fk.ros.joint_input import JointInput
-from icub_leg_fk.ros.joint_state_cdr import decode_joint_state
-from icub_leg_fk.ros.joint_stream import JointStream
 from joint_model import JointModel, LARGEST, Message
 
 SECOND = 1_000_000_000
@@ -21,10 +20,7 @@ def bits(values):
 
 
 class Trial:
-    """A model, a plain input, and two streams, of which one is asked for velocities too.
-
-    Every message goes to all four, and what comes out is compared after each.
-    """
+    """A model and a joint input; every message goes to both, and what comes out is compared."""
 
     def __init__(self, chains, timeout=SECOND // 2):
         self.now = 1_700_000_000 * SECOND
@@ -32,77 +28,56 @@ class Trial:
             {joint: link.limits
              for joint, link in zip(chain.joint_names, chain.joints, strict=True)}
             for chain in chains], timeout)
-        self.reports = [], [], []
-        inputs = [JointInput(chains, timeout / SECOND,
-                             lambda reason, text, to=reports: to.append((reason, text)))
-                  for reports in self.reports]
-        self.plain = inputs[0]
-        self.fast = JointStream(inputs[1], lambda: self.now)
-        self.moving = JointStream(inputs[2], lambda: self.now, velocities=True)
-        self.out = [], []
-        for stream, out in zip((self.fast, self.moving), self.out, strict=True):
-            stream.on_ready = [self._handler(index, out) for index in range(len(chains))]
         self.reported = Counter()
+        self.input = JointInput(chains, timeout / SECOND, lambda: self.now, self._report)
 
-    @staticmethod
-    def _handler(index, out):
-        return lambda sec, nanosec, q, qdot: out.append((index, sec, nanosec, bits(q), bits(qdot)))
+    def _report(self, reason, text):
+        self.reported[reason] += 1
 
     def send(self, message):
         """Send a message and return the chains it made ready."""
         sec, nanosec = message.sec, message.nanosec
         if sec == 0 and nanosec == 0:
             sec, nanosec = divmod(self.now, SECOND)
-        arguments = (sec * SECOND + nanosec, message.names, message.positions, message.velocities)
-        ready = self.model.update(*arguments)
-        expected = [(index, bits(q), bits(qdot)) for index, q, qdot in ready]
-        assert [(vector.chain, bits(vector.positions), bits(vector.velocities))
-                for vector in self.plain.update(*arguments)] == expected, message
-        data = message.cdr()
-        self.fast.feed(data)
-        self.moving.feed(data)
-        assert self.out[0] == [(index, sec, nanosec, q, None) for index, q, _ in expected], message
-        assert self.out[1] == [(index, sec, nanosec, q, v) for index, q, v in expected], message
-        self._check_reports(message)
-        return [index for index, _, _ in ready]
+        ready = self.model.update(sec * SECOND + nanosec, message.names, message.positions,
+                                  message.velocities)
+        expected = [(chain, sec, nanosec, bits(q), bits(qdot)) for chain, q, qdot in ready]
+        assert [(chain, sec, nanosec, bits(q), bits(qdot))
+                for chain, sec, nanosec, q, qdot in self.input.feed(message.cdr())
+                ] == expected, message
+        return [chain for chain, _, _ in ready]
 
-    def send_malformed(self, data):
-        self.model.messages += 1
-        self.model.counts['malformed'] += 1
+    def send_bytes(self, data):
+        """Send bytes that may be anything, and return the chains they made ready."""
         try:
-            decode_joint_state(data)
-        except MalformedMessageError as error:
-            self.plain.reject_malformed(error)
-        self.fast.feed(data)
-        self.moving.feed(data)
-        assert self.out == ([], []), data
-        self._check_reports(data)
-
-    def _check_reports(self, message):
-        plain, fast, moving = self.reports
-        assert plain == fast == moving, message
-        self.reported.update(reason for reason, _ in plain)
-        for log in (*self.reports, *self.out):
-            log.clear()
+            message = decode_joint_state(data)
+        except MalformedMessageError:
+            self.model.messages += 1
+            self.model.counts['malformed'] += 1
+            assert self.input.feed(data) == []
+            return []
+        stamp = message.sec * SECOND + message.nanosec
+        if message.sec == 0 and message.nanosec == 0:
+            stamp = self.now
+        ready = self.model.update(stamp, message.names, message.positions, message.velocities)
+        assert [(chain, sec * SECOND + nanosec, bits(q), bits(qdot))
+                for chain, sec, nanosec, q, qdot in self.input.feed(data)] == [
+                    (chain, stamp, bits(q), bits(qdot)) for chain, q, qdot in ready], data
+        return [chain for chain, _, _ in ready]
 
     def check_state(self):
-        """Compare all that the inputs hold and have counted, then start counting anew."""
+        """Compare all that is held and counted, then start counting anew."""
         model = self.model
-        fast, moving = self.fast.settle(), self.moving.settle()
         for index, chain in enumerate(model.chains):
-            counts = self.plain.take_counts(index)
-            assert counts == fast.take_counts(index) == moving.take_counts(index)
+            counts = self.input.take_counts(index)
             assert counts.ready == model.ready[index]
             assert counts.held_back == model.held_back[index]
             assert {(reason, joint) for reason, joints in counts.joints.items()
-                    for joint in joints} == model.blamed[index]
-            known = {joint: model.held[joint].stamp for joint in chain if joint in model.held}
-            for joint_input in (self.plain, fast, moving):
-                assert joint_input.known_joints(index) == known
-        for joint_input in (self.plain, fast, moving):
-            assert joint_input.messages == model.messages
-            assert joint_input.counts == model.counts
-            assert joint_input.newest == model.newest
+                    for joint in joints if reason != 'looks_like_degrees'} == model.blamed[index]
+            assert self.input.known_joints(index) == {
+                joint: model.held[joint].stamp for joint in chain if joint in model.held}
+        assert (self.input.messages, self.input.newest) == (model.messages, model.newest)
+        assert self.input.counts == model.counts
         expected = sum(model.held_back, Counter()) + model.counts
         del expected['empty_position']
         assert self.reported == expected

@@ -5,12 +5,19 @@ import tracemalloc
 
 from icub_leg_fk.kinematics import Catalog
 from icub_leg_fk.ros.joint_input import JointInput
+from joint_model import Message
 import numpy as np
 import pytest
 
 LEFT, RIGHT = 0, 1
 MS = 1_000_000  # ns
 START = 1_700_000_000_000 * MS
+
+
+def joint_state(ms, names, positions, velocities=(), **more):
+    """Return the bytes of a message at a time [ms from the start]."""
+    sec, nanosec = divmod(START + ms * MS, 1_000_000_000)
+    return Message(sec, nanosec, tuple(names), tuple(positions), tuple(velocities), **more).cdr()
 
 
 class Robot:
@@ -22,14 +29,14 @@ class Robot:
         self.left, self.right = (chain.joint_names for chain in self.chains)
         self.both = self.left + self.right
         self.reports = []
-        self.input = JointInput(self.chains, joint_timeout,
+        self.input = JointInput(self.chains, joint_timeout, lambda: START,
                                 lambda reason, text: self.reports.append((reason, text)))
 
     def send(self, ms, names, positions=None, velocities=()):
         """Send a message at a time [ms from the start] and return what it made ready."""
         if positions is None:
             positions = [0.01 * i for i in range(len(names))]
-        return self.input.update(START + ms * MS, tuple(names), positions, velocities)
+        return self.input.feed(joint_state(ms, names, positions, velocities))
 
     def ready(self, *args, **kwargs):
         return [vector.chain for vector in self.send(*args, **kwargs)]
@@ -81,7 +88,7 @@ def test_partial_messages_update_just_what_they_bring(robot):
 
 
 @pytest.mark.parametrize(('timeout', 'age', 'ready'), [
-    (0.5, 500, True), (0.5, 501, False), (0.02, 20, True), (0.02, 21, False), (0, 10**9, True)])
+    (0.5, 500, True), (0.5, 501, False), (0.02, 20, True), (0.02, 21, False), (0, 10**8, True)])
 def test_a_joint_older_than_the_timeout_beside_its_newest_peer_holds_the_chain_back(
         timeout, age, ready):
     robot = Robot(timeout)
@@ -120,7 +127,7 @@ def test_a_name_that_stands_twice_rejects_the_message_even_a_strangers(robot):
     for twice in ('l_knee', 'stranger'):
         assert robot.ready(1, (*robot.left, twice, 'stranger'), [0.2] * 8) == []
         assert robot.reported() == (
-            'duplicate_name', f'name {twice!r} stands twice; message ignored')
+            'duplicate_name', f'name {twice!r} appears twice; message ignored')
     assert robot.send(2, robot.left[5:], [0.3])[0].positions == (0.1,) * 5 + (0.3,)
 
 
@@ -143,7 +150,7 @@ def test_out_of_range_goes_out_as_it_is_and_is_noted(robot):
     [vector] = robot.send(0, robot.left, [0.0, 0.0, 0.0, 9.0, 0.0, -8.0])
     assert vector.positions == (0.0, 0.0, 0.0, 9.0, 0.0, -8.0)
     counts = robot.input.chain_counts[LEFT]
-    assert counts.joints == {'out_of_range': {'l_knee': '9', 'l_ankle_roll': '-8'}}
+    assert counts.joints['out_of_range'] == {'l_knee': '9', 'l_ankle_roll': '-8'}
     assert counts.ready == 1
 
 
@@ -180,7 +187,7 @@ def test_a_joint_older_than_what_is_held_of_it_is_a_step_back(robot):
 
 def test_strangers_messages_do_not_move_time(robot):
     robot.send(0, robot.both)
-    assert robot.ready(10**9, ['wheel']) == []
+    assert robot.ready(10**8, ['wheel']) == []
     assert robot.ready(1, robot.left) == [LEFT]
     assert robot.input.counts == {}
 
@@ -213,9 +220,9 @@ def test_what_strangers_send_is_not_hoarded(robot):
 
 def test_a_new_input_takes_over_what_is_held(robot):
     robot.send(0, robot.both, [0.1] * 12)
-    successor = JointInput(robot.chains[::-1], 0.5)
+    successor = JointInput(robot.chains[::-1], 0.5, lambda: START)
     successor.take_over(robot.input)
-    [vector] = successor.update(START + MS, robot.left[:1], [0.2])
+    [vector] = successor.feed(joint_state(1, robot.left[:1], [0.2]))
     assert vector.positions == (0.2,) + (0.1,) * 5
     assert successor.messages == 2
 
@@ -224,8 +231,43 @@ def test_joints_that_are_not_taken_over_do_not_move_time():
     before, catalog = Robot(), Catalog.load()
     before.send(0, before.left)
     before.send(400, before.right)
-    successor = JointInput([catalog.chain('left_leg', 'v1')], 0.1)
+    successor = JointInput([catalog.chain('left_leg', 'v1')], 0.1, lambda: START)
     successor.take_over(before.input)
     assert successor.newest == START
-    assert [vector.chain for vector in successor.update(START, before.left[:1], [0.2])] == [0]
+    assert [vector.chain for vector in successor.feed(joint_state(0, before.left[:1], [0.2]))
+            ] == [0]
     assert successor.counts == {}
+
+
+def test_padding_may_hold_anything_and_change_every_time(robot):
+    for ms, padding in enumerate((0, 0xa5, 0, 0xff, 0x5a)):
+        data = joint_state(ms, [*robot.both, 'odd'], [0.1] * 13, [1.0] * 13, padding=padding)
+        assert [vector.chain for vector in robot.input.feed(data)] == [LEFT, RIGHT]
+
+
+def test_big_endian_messages_are_read_and_equal_bytes_in_another_order_are_told_apart(robot):
+    data = joint_state(0, robot.left, [0.1] * 6, order='>')
+    [vector] = robot.input.feed(data)
+    assert vector.positions == (0.1,) * 6
+    assert robot.input.feed(b'\x00\x01' + data[2:]) == []
+    assert robot.reported()[0] == 'malformed'
+
+
+def test_a_zero_stamp_becomes_now(robot):
+    for sec, nanosec, stamp in ((0, 0, START), (0, 5, 5)):
+        robot = Robot()
+        data = Message(sec, nanosec, robot.left, (0.1,) * 6).cdr()
+        [vector] = robot.input.feed(data)
+        assert vector.sec * 1_000_000_000 + vector.nanosec == stamp
+
+
+def test_degrees_for_radians_are_noted(robot):
+    robot.send(0, robot.left, [7.0, 5.0, 0.0, -45.0, 3.0, 0.0])
+    assert list(robot.input.chain_counts[LEFT].joints['looks_like_degrees']) == ['l_knee']
+    robot.send(1, robot.left, [math.radians(value) for value in (130, 100, 70, -120, 30, 20)])
+    assert robot.input.take_counts(LEFT).ready == 2
+
+
+def test_the_names_that_came_last_are_known(robot):
+    robot.send(0, ['L_KNEE', 'icub/l_knee'])
+    assert robot.input.names == ('L_KNEE', 'icub/l_knee')

@@ -231,7 +231,7 @@ def test_warnings_name_what_is_wrong_and_do_not_flood_the_log():
         robot.wait_for(robot.left, t - 10 * SECOND)
         warnings = [line for line in node.log().splitlines() if '[WARN]' in line]
     most = 1 + (time.monotonic() - began) // 5  # each is repeated after 5 s
-    for word in ('11 values for 12 names', "'l_knee' stands twice", 'r_ankle_roll nan',
+    for word in ('11 values for 12 names', "'l_knee' appears twice", 'r_ankle_roll nan',
                  'header.stamp', 'time stepped back', 'r_hip_pitch never seen'):
         assert 1 <= sum(word in line for line in warnings) <= most, (word, warnings)
     assert len(warnings) <= 6 * most, warnings

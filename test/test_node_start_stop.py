@@ -81,15 +81,15 @@ def test_bad_argument_ends_in_one_line_and_exit_code_one(runs, arguments):
         assert word in done.stderr
 
 
-def test_transforms_without_tf2_ros_are_refused_in_one_line():
+def test_transforms_without_tf2_msgs_are_refused_in_one_line():
     try:
-        import tf2_ros
+        import tf2_msgs
     except ImportError:
         done = run('-p publish_tf:=true')
         assert (done.returncode, done.stdout, done.stderr.count('\n')) == (1, '', 1)
-        assert 'tf2_ros' in done.stderr
+        assert 'tf2_msgs' in done.stderr
     else:
-        pytest.skip(f'tf2_ros is there: {tf2_ros.__file__}')
+        pytest.skip(f'tf2_msgs is there: {tf2_msgs.__file__}')
 
 
 def test_broken_kinematics_file_is_one_line_with_its_place(tmp_path):

@@ -1,1 +1,1 @@
-"""The node: JointState in, foot poses out. `joint_*` and `*_cdr` modules need no rclpy."""
+"""The node: JointState in, foot poses out; `joint_input`, `cdr`, `configuration` need no rclpy."""

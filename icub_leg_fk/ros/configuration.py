@@ -63,12 +63,13 @@ class Configuration:
         if not 0.0 <= timeout <= LONGEST_TIMEOUT:
             raise ParameterError(f'parameter joint_timeout: found {timeout}, '
                                  f'allowed: 0 to {LONGEST_TIMEOUT:g} s, 0 is none')
-        if not prefix.isprintable() or ' ' in prefix:
-            raise ParameterError(f'parameter frame_prefix: found {prefix!r}, '
-                                 'allowed: printable characters other than space')
-        if values['publish_tf'] and find_spec('tf2_ros') is None:
+        if not prefix.isprintable() or ' ' in prefix or prefix.startswith('/'):
+            raise ParameterError(f'parameter frame_prefix: found {prefix!r}, allowed: printable '
+                                 'characters other than space, and no leading slash, which tf2 '
+                                 'cannot look up')
+        if values['publish_tf'] and find_spec('tf2_msgs') is None:
             raise ParameterError('parameter publish_tf: found true without the Python module '
-                                 'tf2_ros, allowed: false, or install tf2_ros_py')
+                                 'tf2_msgs; allowed: false, or install tf2_msgs')
         for name, entry in catalog.chains.items():
             if own := values.get(version_parameter(name)):
                 _check_choice(version_parameter(name), own, tuple(entry.versions))

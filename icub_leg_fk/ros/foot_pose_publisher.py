@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import time
+
 from icub_leg_fk.ros.configuration import Configuration
 from icub_leg_fk.ros.diagnostics import Diagnostics
 from icub_leg_fk.ros.joint_input import JointInput
-from icub_leg_fk.ros.joint_stream import JointStream
 from icub_leg_fk.ros.outputs import Outputs
 from icub_leg_fk.ros.parameters import NodeParameters
 from icub_leg_fk.ros.qos_overrides import OVERRIDABLE
@@ -31,38 +32,37 @@ class FootPosePublisher(Node):
         super().__init__(NODE_NAME)
         parameters = NodeParameters(self, self._configure)
         self._warnings = ThrottledWarnings(lambda text: self.get_logger().warning(text))
-        self._stream: JointStream | None = None
-        self._outputs = Outputs(self, self._connect,
-                                lambda chain: self._settled().note_no_velocity(chain))
-        self._diagnostics = Diagnostics(self)
+        self._input = JointInput((), 0.0, lambda: 0)
+        self._heard: float | None = None
+        self._said = ''
+        self._outputs = Outputs(self, lambda chain: self._input.note_no_velocity(chain))
         self._joint_states = self.create_subscription(
-            JointState, 'joint_states', lambda data: None, qos_profile_sensor_data, raw=True,
+            JointState, 'joint_states', self._take, qos_profile_sensor_data, raw=True,
             qos_overriding_options=OVERRIDABLE)
         self._configure(parameters.configuration)
+        self._diagnostics = Diagnostics(self, self._joint_states.topic_name,
+                                        lambda: (self._input, self._heard))
+
+    def _take(self, data: bytes) -> None:
+        """Take one serialized JointState in and publish what it makes ready."""
+        self._heard = time.monotonic()
+        if vectors := self._input.feed(data):
+            self._outputs.publish(vectors)
 
     def _configure(self, configuration: Configuration) -> None:
         """Begin to work as configured, with the joints that are already known."""
-        joint_input = JointInput(configuration.chains, configuration.joint_timeout, self._warnings)
-        if self._stream is not None:
-            joint_input.take_over(self._stream.settle())
+        joint_input = JointInput(configuration.chains, configuration.joint_timeout,
+                                 lambda: self.get_clock().now().nanoseconds, self._warnings)
+        joint_input.take_over(self._input)
+        self._input = joint_input
         self._outputs.configure(configuration)
-        self._stream = JointStream(joint_input, lambda: self.get_clock().now().nanoseconds)
-        self._joint_states.callback = self._stream.feed
-        self._diagnostics.watch(self._stream)
-        self._connect()
-        for note in configuration.notes:
-            self.get_logger().info(note)
-        self.get_logger().info('publishing ' + ', '.join(
+        publishing = ', '.join(
             f'{chain.tip} ({chain.name} {chain.version}, {configuration.frame_prefix}'
             f'{chain.root_frame} to {configuration.frame_prefix}{chain.tip_frame})'
-            for chain in configuration.chains))
-
-    def _connect(self) -> None:
-        """Give each chain's joint vectors to the topics that somebody subscribes to."""
-        if self._stream is not None:
-            self._stream.on_ready = self._outputs.handlers()
-            self._stream.want_velocities(self._outputs.want_velocities())
-
-    def _settled(self) -> JointInput:
-        assert self._stream is not None
-        return self._stream.settle()
+            for chain in configuration.chains)
+        said = f'listening to {self._joint_states.topic_name}, publishing {publishing}'
+        if said != self._said:
+            self._said = said
+            for note in configuration.notes:
+                self.get_logger().info(note)
+            self.get_logger().info(said)

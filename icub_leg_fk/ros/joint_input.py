@@ -1,16 +1,22 @@
-"""The rules by which JointState messages become joint vectors; plain, and free of rclpy.
+"""From serialized JointStates to the joint vectors of some chains; free of rclpy.
+
+The rules:
 
 - Joints are matched by name; joints of no chain are ignored.
 - A message that brings some of a chain's joints updates those. The chain is then ready if each of
   its joints is known, finite and no older than `joint_timeout` beside the newest of them.
   (Finite is what leaves room to compute with: less than `LARGEST_VALUE`.)
-- A message is rejected as a whole if `position` is shorter than `name` or a name stands twice; an
+- A message is rejected as a whole if `position` is shorter than `name` or a name appears twice; an
   empty `position` is counted only.
 - Time has stepped back if a message is older than what is held of a joint it brings, or older by
   more than `joint_timeout` than anything held: then all held joints are forgotten and the message
   counts as the first. (Publishers of different joints may interleave slightly out of order.)
 
 Everything refused is counted by reason, and reported with the joint or field it concerns.
+
+A robot sends the same names in the same order a thousand times a second. So for the bytes of the
+names that it has seen, a `JointInput` remembers which numbers behind them are of concern, and
+unpacks just those. That is a cache: dropped, it costs time and nothing else.
 """
 
 from __future__ import annotations
@@ -19,13 +25,47 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 import math
+from operator import itemgetter
+import struct
+from typing import Any, NamedTuple
 
+from icub_leg_fk.errors import MalformedMessageError
 from icub_leg_fk.kinematics import Chain
-from icub_leg_fk.ros.joint_names import JointNames, ResolvedNames
-from icub_leg_fk.ros.joint_vector import are_usable, JointVector, LARGEST_VALUE
+from icub_leg_fk.ros.cdr import (
+    decode_head,
+    decode_joint_state,
+    HEADER,
+    JointStateHead,
+    STAMP_END,
+)
 
+LARGEST_VALUE = 1e150  # of a position or velocity; beyond it sums and products overflow
 MESSAGE_REASONS = ('malformed', 'empty_position', 'short_position', 'duplicate_name', 'time_jump')
 CHAIN_REASONS = ('missing_joint', 'non_finite', 'stale_joint', 'no_velocity')
+
+_REMEMBERED_LAYOUTS = 8
+_LARGEST_REMEMBERED = 16384  # bytes of names; what a stranger sends may be larger
+_LAST_SECOND = (1 << 31) - 1  # that a stamp can hold
+_LARGEST_USABLE = math.nextafter(LARGEST_VALUE, 0.0)
+_UNKNOWN = math.nan
+
+
+class Ready(NamedTuple):
+    """A chain's joint vector, complete and fresh.
+
+    Attributes:
+        chain: index of the chain.
+        sec: seconds of the stamp.
+        nanosec: nanoseconds of the stamp.
+        positions: n joint positions [rad or m].
+        velocities: n joint velocities [rad/s or m/s]; None if one is not known, or not finite.
+    """
+
+    chain: int
+    sec: int
+    nanosec: int
+    positions: tuple[float, ...]
+    velocities: tuple[float, ...] | None
 
 
 @dataclass
@@ -42,17 +82,83 @@ class ChainCounts:
     held_back: Counter[str] = field(default_factory=Counter)
     joints: dict[str, dict[str, str]] = field(default_factory=dict)
 
-    def blame(self, reason: str, joints: dict[str, str]) -> None:
+    def note(self, reason: str, joints: dict[str, str]) -> None:
         """Note the joints concerned by a reason."""
         self.joints.setdefault(reason, {}).update(joints)
 
 
+class _Joints:
+    """The joints of some chains: a slot for each, and what is held of it."""
+
+    def __init__(self, chains: Sequence[Chain]) -> None:
+        self.slots = {name: slot for slot, name in enumerate(
+            dict.fromkeys(name for chain in chains for name in chain.joint_names))}
+        self.of_chain = [tuple(self.slots[name] for name in chain.joint_names) for chain in chains]
+        self.forget()
+
+    def forget(self) -> None:
+        """Hold nothing."""
+        self.stamps: list[int | None] = [None] * len(self.slots)
+        self.positions = [_UNKNOWN] * len(self.slots)
+        self.velocities = [_UNKNOWN] * len(self.slots)
+
+
+class _Layout:
+    """What the messages of one list of names bring, and where."""
+
+    def __init__(self, data: bytes, head: JointStateHead, joints: _Joints) -> None:
+        self.names = head.names
+        self.duplicate = next((name for name, count in Counter(head.names).items() if count > 1),
+                              None)
+        self.end = head.end
+        self.stamp = struct.Struct(f'{head.byte_order}iI').unpack_from
+        self.count = struct.Struct(f'{head.byte_order}I').unpack_from
+        self.encapsulation = bytes(data[:2])
+        self.head = data[STAMP_END:head.end]
+        mask = bytearray(b'\xff' * head.end)
+        for at, size in head.padding:
+            mask[at:at + size] = bytes(size)
+        self._mask = int.from_bytes(mask[STAMP_END:], 'little')
+        self._masked_head = int.from_bytes(self.head, 'little') & self._mask
+        places: dict[int, int] = {}
+        for index, name in enumerate(head.names):
+            if name in joints.slots:
+                places.setdefault(joints.slots[name], index)
+        self.slots = tuple(places)
+        skips = [index - before - 1 for before, index in zip(
+            (-1, *places.values()), places.values())]
+        self.numbers = struct.Struct(head.byte_order + ''.join(
+            f'{8 * skip}xd' for skip in skips)).unpack_from
+        # Of each chain touched: what picks its joints, if they are all here.
+        self.chains: list[tuple[int, Callable[[Any], Any] | None]] = []
+        order = {slot: i for i, slot in enumerate(self.slots)}
+        for chain, slots in enumerate(joints.of_chain):
+            if touched := order.keys() & set(slots):
+                self.chains.append((chain, _picker([order[slot] for slot in slots])
+                                    if len(touched) == len(slots) else None))
+
+    def fits(self, data: bytes) -> bool:
+        """Return whether data begins with these names, whatever its padding holds."""
+        if data[:2] != self.encapsulation:
+            return False
+        if data.startswith(self.head, STAMP_END):
+            return True
+        head = data[STAMP_END:self.end]
+        if int.from_bytes(head, 'little') & self._mask != self._masked_head:
+            return False
+        if len(head) != len(self.head):
+            return False
+        self.head = head
+        return True
+
+
 class JointInput:
-    """Holds the newest position of every joint of some chains and applies the rules.
+    """Takes JointStates in and says which chains they make ready.
 
     Args:
-        chains: the chains to feed.
+        chains: the chains; one joint may belong to several.
         joint_timeout: greatest age of a joint beside the newest of its chain [s]; 0 is none.
+        now: returns the present time [ns], which stamps messages with a zero stamp.
         report: called with a reason and one line of text for everything worth a warning.
 
     Attributes:
@@ -60,97 +166,87 @@ class JointInput:
         counts: messages by reason of `MESSAGE_REASONS`.
         chain_counts: one `ChainCounts` per chain.
         newest: newest stamp held [ns], or None while nothing is.
+        names: joint names of the last message that could be read.
     """
 
-    def __init__(self, chains: Sequence[Chain], joint_timeout: float,
+    def __init__(self, chains: Sequence[Chain], joint_timeout: float, now: Callable[[], int],
                  report: Callable[[str, str], None] = lambda reason, text: None) -> None:
         self.chains = tuple(chains)
         self.messages = 0
         self.counts: Counter[str] = Counter()
         self.chain_counts = [ChainCounts() for _ in self.chains]
         self.newest: int | None = None
+        self.names: tuple[str, ...] = ()
+        self._now = now
         self._report = report
         self._timeout_ns = round(joint_timeout * 1e9)
-        self._names = JointNames(self.chains)
-        self._forget()
+        self._joints = _Joints(self.chains)
+        self._bounds = [[(max(lower, -_LARGEST_USABLE), min(upper, _LARGEST_USABLE))
+                         for lower, upper in zip(chain.lower.tolist(), chain.upper.tolist())]
+                        for chain in self.chains]
+        self._layouts: list[_Layout] = []
 
-    def update(self, stamp_ns: int, names: tuple[str, ...], positions: Sequence[float],
-               velocities: Sequence[float] = ()) -> list[JointVector]:
-        """Take one message in and return the joint vectors it makes ready, one per chain at most.
-
-        Args:
-            stamp_ns: stamp of the message [ns], already replaced by now if it was zero.
-            names: joint names.
-            positions: positions [rad or m].
-            velocities: velocities [rad/s or m/s].
-        """
+    def feed(self, data: bytes) -> list[Ready]:
+        """Take one serialized JointState in and return the joint vectors it makes ready."""
         self.messages += 1
-        if not positions:
-            self.counts['empty_position'] += 1
+        try:
+            layout = self._layout(data)
+            sec, nanosec = layout.stamp(data, HEADER)
+            positions, velocities = self._numbers(data, layout)
+        except MalformedMessageError as error:
+            self._reject('malformed', f'{error}; message ignored')
             return []
-        if len(positions) < len(names):
-            self._reject('short_position', f'position has {len(positions)} values for '
-                         f'{len(names)} names; message ignored')
+        self.names = layout.names
+        if positions is None or not layout.slots:
             return []
-        resolved = self._names.resolve(names)
-        if resolved.duplicate is not None:
-            self._reject('duplicate_name', f'name {resolved.duplicate[:60]!r} stands twice; '
-                         'message ignored')
-            return []
-        if not resolved.pairs:
-            return []
-        if self._stepped_back(stamp_ns, resolved):
-            self._reject('time_jump', f'time stepped back to {stamp_ns / 1e9:.3f} s; '
-                         'held joints are forgotten')
-            self._forget()
-        if len(velocities) < len(names):
-            velocities = [math.nan] * len(names)
-        for index, slot in resolved.pairs:
-            self._stamps[slot] = stamp_ns
-            self._positions[slot] = positions[index]
-            self._velocities[slot] = velocities[index]
-        self.newest = stamp_ns if self.newest is None else max(self.newest, stamp_ns)
-        ready = [self._joint_vector(chain) for chain in resolved.chains]
-        return [vector for vector in ready if vector is not None]
-
-    def hold(self, stamp_ns: int, names: tuple[str, ...], positions: Sequence[float],
-             velocities: Sequence[float], repeats: int, ready: Sequence[int]) -> None:
-        """Take in the last of some messages that a faster path has found good and given out.
-
-        Args:
-            stamp_ns: stamp of the last message [ns].
-            names: joint names.
-            positions: positions of the last message [rad or m].
-            velocities: velocities of the last message [rad/s or m/s]; empty if unknown.
-            repeats: how many such messages there were.
-            ready: the chains that each of them made ready.
-        """
-        self.messages += repeats
-        for chain in ready:
-            self.chain_counts[chain].ready += repeats
-        if names:
-            self.newest = stamp_ns if self.newest is None else max(self.newest, stamp_ns)
-        for index, slot in self._names.resolve(names).pairs:
-            self._stamps[slot] = stamp_ns
-            self._positions[slot] = positions[index]
-            self._velocities[slot] = velocities[index] if velocities else math.nan
-
-    def reject_malformed(self, error: Exception) -> None:
-        """Count a message that could not even be decoded."""
-        self.messages += 1
-        self._reject('malformed', f'{error}; message ignored')
+        if sec == 0 and nanosec == 0:
+            sec, nanosec = divmod(self._now(), 1_000_000_000)
+            if sec > _LAST_SECOND:  # a bag may say it was recorded then
+                self._reject('malformed', f'the stamp is zero and the time is {sec} s; allowed: '
+                             f'up to {_LAST_SECOND} s; message ignored')
+                return []
+        stamp = sec * 1_000_000_000 + nanosec
+        if self.newest is None or stamp >= self.newest:
+            self.newest = stamp
+        elif self._stepped_back(stamp, layout):
+            self._reject('time_jump', f'time stepped back to {stamp / 1e9:.3f} s; held joints are '
+                         'forgotten')
+            self._joints.forget()
+            self.newest = stamp
+        joints = self._joints
+        for slot, position, velocity in zip(layout.slots, positions, velocities):
+            joints.stamps[slot] = stamp
+            joints.positions[slot] = position
+            joints.velocities[slot] = velocity
+        ready = []
+        for chain, pick in layout.chains:
+            if pick is not None:
+                q, qdot = pick(positions), pick(velocities)
+            elif self._is_missing_or_stale(chain):
+                continue
+            else:
+                slots = joints.of_chain[chain]
+                q = tuple([joints.positions[slot] for slot in slots])
+                qdot = tuple([joints.velocities[slot] for slot in slots])
+            for value, (lower, upper) in zip(q, self._bounds[chain]):
+                if not lower <= value <= upper:
+                    usable = self._note_positions(chain, q)
+                    break
+            else:
+                usable = True
+            if usable:
+                self.chain_counts[chain].ready += 1
+                ready.append(Ready(chain, sec, nanosec, q, qdot if _are_usable(qdot) else None))
+        return ready
 
     def note_no_velocity(self, chain: int) -> None:
         """Count a joint vector whose velocities are wanted and unknown."""
-        joints = {
-            name: 'unknown' if math.isnan(self._velocities[slot]) else str(self._velocities[slot])
-            for name, slot in zip(self.chains[chain].joint_names, self._names.chain_slots[chain],
-                                  strict=True)
-            if not are_usable((self._velocities[slot],))}
-        self.chain_counts[chain].held_back['no_velocity'] += 1
-        self.chain_counts[chain].blame('no_velocity', joints)
-        self._report('no_velocity', f'{self.chains[chain].name}: no twist: velocity of '
-                     f'{", ".join(f"{name} {what}" for name, what in joints.items())}')
+        found = {}
+        for name, slot in zip(self.chains[chain].joint_names, self._joints.of_chain[chain]):
+            velocity = self._joints.velocities[slot]
+            if not _are_usable((velocity,)):
+                found[name] = 'unknown' if math.isnan(velocity) else str(velocity)
+        self._hold_back(chain, 'no_velocity', found, 'no twist: velocity of ')
 
     def take_counts(self, chain: int) -> ChainCounts:
         """Return what has happened to a chain since this was last called."""
@@ -159,74 +255,153 @@ class JointInput:
 
     def take_over(self, previous: JointInput) -> None:
         """Go on with the joints and the counts of an input that this one replaces."""
-        self.messages, self.counts = previous.messages, previous.counts
+        self.messages, self.counts, self.names = (previous.messages, previous.counts,
+                                                  previous.names)
         counts = {chain.name: previous.take_counts(index)
                   for index, chain in enumerate(previous.chains)}
         self.chain_counts = [counts.get(chain.name, ChainCounts()) for chain in self.chains]
-        for name, slot in self._names.slots.items():
-            if (old := previous._names.slots.get(name)) is not None:
-                self._stamps[slot] = previous._stamps[old]
-                self._positions[slot] = previous._positions[old]
-                self._velocities[slot] = previous._velocities[old]
-        self.newest = max((stamp for stamp in self._stamps if stamp is not None), default=None)
+        ours, theirs = self._joints, previous._joints
+        for name, slot in ours.slots.items():
+            if (old := theirs.slots.get(name)) is not None:
+                ours.stamps[slot] = theirs.stamps[old]
+                ours.positions[slot] = theirs.positions[old]
+                ours.velocities[slot] = theirs.velocities[old]
+        self.newest = max((stamp for stamp in ours.stamps if stamp is not None), default=None)
 
     def known_joints(self, chain: int) -> dict[str, int]:
         """Return the stamps [ns] of those joints of a chain that are held."""
         return {name: stamp for name, slot in zip(
-            self.chains[chain].joint_names, self._names.chain_slots[chain], strict=True)
-            if (stamp := self._stamps[slot]) is not None}
+            self.chains[chain].joint_names, self._joints.of_chain[chain])
+            if (stamp := self._joints.stamps[slot]) is not None}
+
+    def _layout(self, data: bytes) -> _Layout:
+        """Return what the names of a message mean, remembered or read anew."""
+        layouts = self._layouts
+        for index, layout in enumerate(layouts):
+            if layout.fits(data):
+                if index:  # the likeliest first
+                    layouts.insert(0, layouts.pop(index))
+                return layout
+        layout = _Layout(data, decode_head(data), self._joints)
+        if layout.end <= _LARGEST_REMEMBERED:
+            layouts.insert(0, layout)
+            del layouts[_REMEMBERED_LAYOUTS:]
+        return layout
+
+    def _numbers(self, data: bytes, layout: _Layout
+                 ) -> tuple[tuple[float, ...] | None, Sequence[float]]:
+        """Return positions and velocities of the layout's joints; None if they are refused."""
+        count = layout.count
+        try:
+            positions_at, n_positions, at = _sequence(data, layout.end, count)
+            velocities_at, n_velocities, at = _sequence(data, at, count)
+            at = _sequence(data, at, count)[2]
+        except struct.error:
+            at = len(data) + 1
+        if at > len(data):
+            decode_joint_state(data)  # which says where it ends too early
+            raise MalformedMessageError('JointState ends too early')
+        if n_positions == 0:
+            self.counts['empty_position'] += 1
+            return None, ()
+        n = len(layout.names)
+        if n_positions < n:
+            self._reject('short_position', f'position has {n_positions} values for {n} names; '
+                         'message ignored')
+            return None, ()
+        if layout.duplicate is not None:
+            self._reject('duplicate_name', f'name {layout.duplicate[:60]!r} appears twice; '
+                         'message ignored')
+            return None, ()
+        positions = layout.numbers(data, positions_at)
+        if n_velocities < n:
+            return positions, (_UNKNOWN,) * len(positions)
+        return positions, layout.numbers(data, velocities_at)
+
+    def _stepped_back(self, stamp: int, layout: _Layout) -> bool:
+        assert self.newest is not None
+        if self._timeout_ns and stamp < self.newest - self._timeout_ns:
+            return True
+        held = (self._joints.stamps[slot] for slot in layout.slots)
+        return any(before is not None and before > stamp for before in held)
+
+    def _is_missing_or_stale(self, chain: int) -> bool:
+        """Tell whether a chain lacks joints, and count and report it if so."""
+        names, slots = self.chains[chain].joint_names, self._joints.of_chain[chain]
+        stamps = {name: self._joints.stamps[slot] for name, slot in zip(names, slots)}
+        known = [stamp for stamp in stamps.values() if stamp is not None]
+        newest = max(known)
+        oldest_allowed = newest - self._timeout_ns if self._timeout_ns else min(known)
+        missing = {name: 'never seen' for name, stamp in stamps.items() if stamp is None}
+        stale = {name: f'{(newest - stamp) / 1e9:.3f} s old' for name, stamp in stamps.items()
+                 if stamp is not None and stamp < oldest_allowed}
+        self._hold_back(chain, 'missing_joint', missing)
+        self._hold_back(chain, 'stale_joint', stale)
+        if missing or stale:
+            fresh = [self._joints.positions[slot] if name not in missing | stale else 0.0
+                     for name, slot in zip(names, slots)]
+            self._hold_back(chain, 'non_finite', self._not_finite(chain, fresh))
+        return bool(missing or stale)
+
+    def _note_positions(self, chain: int, q: Sequence[float]) -> bool:
+        """Note which positions are not finite or out of range; tell whether the pose goes out."""
+        bad = self._not_finite(chain, q)
+        self._hold_back(chain, 'non_finite', bad)
+        if bad:
+            return False
+        names = self.chains[chain].joint_names
+        outside, turns = {}, {}
+        for name, value, (lower, upper), link in zip(names, q, self._bounds[chain],
+                                                     self.chains[chain].joints):
+            if not lower <= value <= upper:
+                outside[name] = f'{value:.6g}'
+                beyond = max(lower - value, value - upper)
+                if not link.is_prismatic and min(abs(value), beyond) > 2 * math.pi:
+                    turns[name] = f'{value:.6g}'
+        self.chain_counts[chain].note('out_of_range', outside)
+        if turns:
+            self.chain_counts[chain].note('looks_like_degrees', turns)
+        return True
+
+    def _not_finite(self, chain: int, q: Sequence[float]) -> dict[str, str]:
+        return {name: str(value) for name, value in zip(self.chains[chain].joint_names, q)
+                if not abs(value) < LARGEST_VALUE}
+
+    def _hold_back(self, chain: int, reason: str, joints: dict[str, str],
+                   what: str = 'no pose: ') -> None:
+        """Count and report what keeps a chain from being published, if anything does."""
+        if not joints:
+            return
+        self.chain_counts[chain].held_back[reason] += 1
+        self.chain_counts[chain].note(reason, joints)
+        listed = ', '.join(f'{name} {found}' for name, found in joints.items())
+        self._report(reason, f'{self.chains[chain].name}: {what}{listed}')
 
     def _reject(self, reason: str, text: str) -> None:
         self.counts[reason] += 1
         self._report(reason, text)
 
-    def _forget(self) -> None:
-        self._stamps: list[int | None] = [None] * len(self._names.slots)
-        self._positions = [math.nan] * len(self._names.slots)
-        self._velocities = [math.nan] * len(self._names.slots)
-        self.newest = None
 
-    def _stepped_back(self, stamp_ns: int, resolved: ResolvedNames) -> bool:
-        if self.newest is None or stamp_ns >= self.newest:
+def _sequence(data: bytes, at: int, count: Callable[..., tuple[int]]) -> tuple[int, int, int]:
+    """Return offset and number of the doubles whose count is at an offset, and where they end."""
+    n, = count(data, at)
+    start = at + 4
+    if n:
+        start += (HEADER - start) % 8
+    return start, n, start + 8 * n
+
+
+def _are_usable(values: Sequence[float]) -> bool:
+    """Return whether all values are finite, with room to compute with them."""
+    for value in values:
+        if not -LARGEST_VALUE < value < LARGEST_VALUE:
             return False
-        if self._timeout_ns and stamp_ns < self.newest - self._timeout_ns:
-            return True
-        held = (self._stamps[slot] for _, slot in resolved.pairs)
-        return any(stamp is not None and stamp > stamp_ns for stamp in held)
+    return True
 
-    def _joint_vector(self, index: int) -> JointVector | None:
-        chain, slots, counts = self.chains[index], self._names.chain_slots[index], \
-            self.chain_counts[index]
-        stamps = [self._stamps[slot] for slot in slots]
-        positions = tuple([self._positions[slot] for slot in slots])
-        known = [stamp for stamp in stamps if stamp is not None]
-        oldest_allowed = max(known) - self._timeout_ns if self._timeout_ns else min(known)
-        found: dict[str, dict[str, str]] = {}
-        for name, stamp, position in zip(chain.joint_names, stamps, positions, strict=True):
-            if stamp is None:
-                found.setdefault('missing_joint', {})[name] = 'never seen'
-            elif stamp < oldest_allowed:
-                age = (max(known) - stamp) / 1e9
-                found.setdefault('stale_joint', {})[name] = f'{age:.3f} s old'
-            elif not abs(position) < LARGEST_VALUE:
-                found.setdefault('non_finite', {})[name] = str(position)
-        if found:
-            for reason, joints in found.items():
-                counts.held_back[reason] += 1
-                counts.blame(reason, joints)
-                listed = ', '.join(f'{name} {what}' for name, what in joints.items())
-                self._report(reason, f'{chain.name}: no pose: {listed}')
-            return None
-        counts.ready += 1
-        self.note_range(index, positions)
-        velocities = tuple([self._velocities[slot] for slot in slots])
-        return JointVector(index, positions,
-                           velocities if are_usable(velocities) else None)
 
-    def note_range(self, index: int, positions: Sequence[float]) -> None:
-        """Note the joints that are outside their documented range; the pose goes out anyway."""
-        chain = self.chains[index]
-        if outside := chain.out_of_range(positions):
-            by_name = dict(zip(chain.joint_names, positions, strict=True))
-            self.chain_counts[index].blame(
-                'out_of_range', {name: f'{by_name[name]:.6g}' for name in outside})
+def _picker(places: list[int]) -> Callable[[Any], Any]:
+    """Return what picks the values at some places out of a tuple, as a tuple."""
+    first, last = places[0], places[-1]
+    if places == list(range(first, last + 1)):
+        return itemgetter(slice(first, last + 1))
+    return itemgetter(*places)

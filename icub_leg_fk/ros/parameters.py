@@ -58,7 +58,7 @@ _PARAMETERS = (
     _Parameter('stamp_source', 'message', "Stamp of the poses: the message's, or the node's "
                "time; a zero message stamp always becomes the node's time.",
                ' or '.join(STAMP_SOURCES)),
-    _Parameter('publish_tf', False, 'Also broadcast the poses as transforms (needs tf2_ros_py).'),
+    _Parameter('publish_tf', False, 'Also broadcast the poses on /tf (needs tf2_msgs).'),
     _Parameter('publish_twist', False, 'Also publish the velocity of the tips.'),
     _Parameter('publish_markers', False, 'Also publish the skeletons for RViz and Foxglove.'),
 )

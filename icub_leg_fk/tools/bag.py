@@ -1,37 +1,44 @@
-"""`leg_fk bag`: copies bags and adds the poses of the feet."""
+"""`leg_fk bag`: copies recordings and adds the poses of the feet.
+
+`add_foot_poses` does one recording, by the node's own rules and with its own code; it takes and
+returns plain values, so a fleet of recordings is a map over it.
+"""
 
 from __future__ import annotations
 
 import argparse
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 import os
 from pathlib import Path
 import re
+import sqlite3
 import sys
-from typing import TYPE_CHECKING
+import time
+from typing import Any, TYPE_CHECKING
 
-from icub_leg_fk.errors import LegFKError, OutputFileError
+from icub_leg_fk.errors import InputFileError, LegFKError, OutputFileError
 from icub_leg_fk.tools.chain_arguments import (
     add_chain_version,
     add_kinematics_file,
     DEFAULT_VERSION,
     own_versions,
 )
+from icub_leg_fk.tools.output_file import check_target, whole_path
 
 if TYPE_CHECKING:
+    from icub_leg_fk.kinematics import Chain
     from icub_leg_fk.ros.configuration import Configuration
-    from icub_leg_fk.tools.bags.conversion import Conversion
-    from icub_leg_fk.tools.bags.jobs import Outcome, Task
+    from icub_leg_fk.ros.joint_input import Ready
 
 HELP = 'copy a bag and add the poses of the feet, as the node would have published them'
 EXAMPLES = """\
-Reads rosbag2 bags, mcap and sqlite3: split, compressed, unfinished or damaged ones too. Copies
-every topic as it is and adds /foot_pose_publisher/<tip>/pose behind each message of joint states,
-by the node's own rules and bit for bit what the node would give; a message with a zero stamp is
-stamped with the time it was recorded at. OUT is a directory, or a single file if it ends in
-.mcap or .db3. It appears when it is complete; until then, all work is in .OUT.partial beside it.
-
-exit status: 0, 1 if a part of a bag could not be read (the output has all the rest, and the
-summary says what is missing), 2 if there is no output.
+Reads rosbag2 bags by rosbags: mcap and sqlite3, split and compressed ones too, directories or
+single files. Copies every topic as it is and adds /foot_pose_publisher/<tip>/pose behind each
+message of joint states, by the node's own rules and byte for byte what the node would send; a
+message with a zero stamp is stamped with the time it was recorded at. OUT is a directory, or a
+single file if it ends in .mcap or .db3. It appears when it is complete.
 
 examples:
   leg_fk bag walking walking_with_poses
@@ -41,7 +48,397 @@ examples:
   leg_fk bag walking all_poses --chains left_leg head_imu --chain-version head_imu=v2
   leg_fk bag monday/* --out-dir with_poses --jobs 4"""
 
-PARTLY_READ = 1  # the exit status
+NODE = '/foot_pose_publisher'
+POSE, TWIST, TF = ('geometry_msgs/msg/PoseStamped', 'geometry_msgs/msg/TwistStamped',
+                   'tf2_msgs/msg/TFMessage')
+TF_TOPIC = '/tf'
+STORAGES = {'.mcap': 'mcap', '.db3': 'sqlite3'}
+_UNKNOWN_HASH = f'RIHS01_{"0" * 64}'
+_NAMES_SHOWN = 20
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What has been done with one recording.
+
+    Attributes:
+        source: the recording that was read.
+        target: the one that was made.
+        copied: messages copied.
+        added: messages added, by topic.
+        joint_states: messages of joint states.
+        rejected: of these, how many were rejected, by reason.
+        held_back: per chain and reason, how many gave no pose or twist, and the joints concerned.
+        notes: what a user should know, one line each.
+        recorded: time from the first to the last message [s].
+        took: time the work took [s].
+    """
+
+    source: str
+    target: str
+    copied: int
+    added: dict[str, int]
+    joint_states: int
+    rejected: dict[str, int]
+    held_back: dict[str, dict[str, tuple[int, str]]]
+    notes: list[str]
+    recorded: float
+    took: float
+
+
+def add_foot_poses(
+        source: str | Path, target: str | Path, *,
+        chains: Sequence[str] = ('left_leg', 'right_leg'), version: str = DEFAULT_VERSION,
+        chain_versions: Mapping[str, str] | None = None, kinematics_file: str = '',
+        foot_frame: str = 'dh', frame_prefix: str = '', joint_timeout: float = 0.5,
+        joint_topic: str | None = None, twist: bool = False, tf: bool = False,
+        only_poses: bool = False, replace_poses: bool = False, storage: str = '',
+        force: bool = False, progress: Callable[[float], None] | None = None) -> Summary:
+    """Copy a recording and add the poses of the feet.
+
+    Args:
+        source: directory of a rosbag2 recording, or a .mcap or .db3 file.
+        target: directory to make, or a file if its name ends in .mcap or .db3.
+        chains: chains of the kinematics file.
+        version: version of every chain that has none of its own.
+        chain_versions: versions of single chains, by name.
+        kinematics_file: path of a kinematics file; the shipped one if empty.
+        foot_frame: a tip frame's name.
+        frame_prefix: put before every frame id.
+        joint_timeout: age of a joint beside the newest of its chain that holds the chain back [s].
+        joint_topic: topic of the joint states; `/joint_states`, or the only one there is, if None.
+        twist: whether velocities of the tips are added, too.
+        tf: whether the poses are added to /tf, too.
+        only_poses: whether everything but what is added is left out.
+        replace_poses: whether poses that the recording has already are left out.
+        storage: `mcap` or `sqlite3`; if empty as the target says, or as the source has it.
+        force: whether an existing target is replaced.
+        progress: called now and then with the share that is done, 0 to 1.
+
+    Raises:
+        InputFileError: the source cannot be read, or has no joint of any chain.
+        OutputFileError: the target exists, is part of the source, or cannot be written.
+        LegFKError: a choice is not valid.
+    """
+    configuration = _configuration(
+        chains=list(chains), version=version, kinematics_file=kinematics_file,
+        foot_frame=foot_frame, frame_prefix=frame_prefix, joint_timeout=joint_timeout,
+        chain_versions=chain_versions or {}, twist=twist, tf=tf)
+    source, target = Path(source), Path(target)
+    _check_apart(source, target)
+    storage = _storage(target, storage)
+    check_target(target, force=force, may_replace=_is_bag)
+    from icub_leg_fk.tools.bag_reading import joint_connections, open_bag
+
+    began = time.monotonic()
+    with open_bag(source) as reader:
+        job = _Job(reader, source, configuration,
+                   joint_connections(reader, source, joint_topic), only_poses, replace_poses)
+        if not storage:
+            storage = 'mcap' if _has_mcap(source) else 'sqlite3'
+        with whole_path(target, force=force, may_replace=_is_bag) as place:
+            _write(place, storage, job, progress)
+            job.check_use()
+        return job.summary(str(target), time.monotonic() - began)
+
+
+def _write(place: Path, storage: str, job: _Job,
+           progress: Callable[[float], None] | None) -> None:
+    """Write the new recording at a place: a directory, or a file if its name says so."""
+    from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
+
+    ending = place.suffix if place.suffix in STORAGES else ''
+    directory = place.with_name(f'{place.stem}.directory') if ending else place
+    plugin = StoragePlugin.MCAP if storage == 'mcap' else StoragePlugin.SQLITE3
+    try:
+        with Writer(directory, version=Writer.VERSION_LATEST, storage_plugin=plugin) as writer:
+            job.run(writer, progress)
+    except (sqlite3.Error, WriterError) as error:
+        raise OutputFileError(f'{place.name}: cannot be written: {error}') from error
+    if ending:
+        file, = directory.glob(f'*{ending}')
+        file.rename(place)
+
+
+class _Job:
+    """A recording, the poses that join it, and what becomes known on the way."""
+
+    def __init__(self, reader: Any, source: Path, configuration: Configuration,
+                 joint_connections: list[Any], only_poses: bool, replace_poses: bool) -> None:
+        from icub_leg_fk.ros.joint_input import JointInput
+        from rosbags.typesys import get_typestore, Stores
+
+        self._reader, self._source = reader, source
+        self._configuration = configuration
+        self._store = get_typestore(Stores.ROS2_JAZZY)
+        self._joint_ids = {connection.id for connection in joint_connections}
+        self._time = 0
+        self._first = self._last = 0
+        self._names: tuple[str, ...] = ()
+        self._was_held_back: list[Counter[str]] = []
+        self._input = JointInput(configuration.chains, configuration.joint_timeout,
+                                 lambda: self._time)
+        self._outputs = [_ChainOutput(chain, configuration) for chain in configuration.chains]
+        self._notes = list(configuration.notes)
+        self._copied = 0
+        self._added: Counter[str] = Counter()
+        self._kept = [] if only_poses else list(reader.connections)
+        self._own_tf: frozenset[int] = frozenset()
+        if not only_poses:
+            self._look_for_old_poses(replace_poses)
+
+    def run(self, writer: Any, progress: Callable[[float], None] | None) -> None:
+        """Copy the messages, each joint state followed by what it gives."""
+        from icub_leg_fk.tools.bag_reading import messages
+
+        for key, value in (self._reader.storage.metadata.custom or {}).items():
+            writer.set_custom_data(key, str(value))
+        copies = {connection.id: self._copy(writer, connection) for connection in self._kept}
+        added = self._add_connections(writer, copies)
+        wanted = list({connection.id: connection for connection in (
+            *self._kept, *(c for c in self._reader.connections if c.id in self._joint_ids))
+            }.values())
+        write, feed, joint_ids = writer.write, self._input.feed, self._joint_ids
+        total = sum(connection.msgcount for connection in wanted) or 1
+        for number, (connection, timestamp, data) in enumerate(
+                messages(self._reader, self._source, wanted)):
+            if number == 0:
+                self._first = timestamp
+            self._last = max(timestamp, self._last)
+            if (copy := copies.get(connection.id)) is not None:
+                kept = (self._without_own_transforms(data) if connection.id in self._own_tf
+                        else data)
+                if kept is not None:
+                    write(copy, timestamp, kept)
+                    self._copied += 1
+            if connection.id in joint_ids:
+                self._time = timestamp
+                vectors = feed(data)
+                for topic, message in self._messages(vectors):
+                    write(added[topic], timestamp, message)
+                    self._added[topic] += 1
+                if self._input.names:
+                    self._names = self._input.names
+            if progress is not None and number % 1000 == 0:
+                progress(number / total)
+
+    def check_use(self) -> None:
+        """Refuse a recording of which no joint belongs to any chain."""
+        counts = self._input.chain_counts
+        if any(count.ready or count.held_back for count in counts) or (
+                self._input.counts - Counter(time_jump=self._input.counts['time_jump'])):
+            return
+        wanted = '; '.join(f'{chain.name} needs {", ".join(chain.joint_names)}'
+                           for chain in self._configuration.chains)
+        if not self._input.messages:
+            raise InputFileError(f'{self._source}: no message of joint states; {wanted}')
+        shown = ', '.join(self._names[:_NAMES_SHOWN]) or 'none'
+        more = len(self._names) - _NAMES_SHOWN
+        raise InputFileError(f'{self._source}: no message has a joint of any chain: {wanted}; '
+                             f'names found: {shown}{f" and {more} more" if more > 0 else ""}')
+
+    def summary(self, target: str, took: float) -> Summary:
+        """Return what has been done."""
+        joint_input = self._input
+        return Summary(
+            source=str(self._source), target=target, copied=self._copied,
+            added={topic: self._added[topic] for topic, _ in self._topics()},
+            joint_states=joint_input.messages, rejected=dict(joint_input.counts),
+            held_back={chain.name: {
+                reason: (count, ', '.join(
+                    f'{joint} {what}' for joint, what in counts.joints.get(reason, {}).items()))
+                for reason, count in counts.held_back.items()}
+                for chain, counts in zip(joint_input.chains, joint_input.chain_counts)},
+            notes=list(dict.fromkeys(self._notes)),
+            recorded=(self._last - self._first) / 1e9, took=took)
+
+    def _topics(self) -> Iterator[tuple[str, str]]:
+        """Yield topic and type of what is added."""
+        for output in self._outputs:
+            yield output.pose_topic, POSE
+            if self._configuration.publish_twist:
+                yield output.twist_topic, TWIST
+        if self._configuration.publish_tf:
+            yield TF_TOPIC, TF
+
+    def _messages(self, vectors: Sequence[Ready]) -> Iterator[tuple[str, bytes]]:
+        """Yield topic and bytes of what a message of joint states has made ready."""
+        twist, tf = self._configuration.publish_twist, self._configuration.publish_tf
+        poses = []
+        for index, sec, nanosec, q, qdot in vectors:
+            output = self._outputs[index]
+            pose = output.chain.pose(q)
+            poses.append(pose)
+            yield output.pose_topic, output.encode_pose(sec, nanosec, pose)
+            if twist and qdot is not None:
+                yield output.twist_topic, output.encode_twist(sec, nanosec,
+                                                              output.chain.twist(q, qdot))
+            elif twist:
+                self._input.note_no_velocity(index)
+        if tf and poses:
+            from icub_leg_fk.ros.cdr import TFMessageEncoder
+            encoder = TFMessageEncoder([self._outputs[vector.chain].frames for vector in vectors])
+            yield TF_TOPIC, encoder.encode(vectors[0].sec, vectors[0].nanosec, poses)
+
+    def _copy(self, writer: Any, connection: Any) -> Any:
+        """Add a connection like one of the source."""
+        return writer.add_connection(
+            connection.topic, connection.msgtype, msgdef=connection.msgdef.data,
+            rihs01=connection.digest or self._hash_of(connection),
+            serialization_format='cdr',
+            offered_qos_profiles=connection.ext.offered_qos_profiles)
+
+    def _add_connections(self, writer: Any, copies: Mapping[int, Any]) -> dict[str, Any]:
+        added = {}
+        for topic, kind in self._topics():
+            there = [copies[connection.id] for connection in self._kept
+                     if (connection.topic, connection.msgtype) == (topic, kind)]
+            added[topic] = there[0] if there else writer.add_connection(
+                topic, kind, typestore=self._store,
+                offered_qos_profiles=[_reliable(100 if topic == TF_TOPIC else 10)])
+        return added
+
+    def _hash_of(self, connection: Any) -> str:
+        """Return the type hash that a recording does not hold, from the definition."""
+        from rosbags.typesys import get_types_from_idl, get_types_from_msg
+
+        try:
+            store, text = self._store, connection.msgdef.data
+            if text:
+                types = (get_types_from_idl(text) if text.startswith('=' * 80 + '\nIDL: ')
+                         else get_types_from_msg(text, connection.msgtype))
+                from rosbags.typesys import get_typestore, Stores
+                store = get_typestore(Stores.EMPTY)
+                store.register(types)
+            return str(store.hash_rihs01(connection.msgtype))
+        except Exception:  # noqa: BLE001 (whatever a strange definition makes of it)
+            self._notes.append(f'the type hash of {connection.msgtype} is not known; '
+                               f'{_UNKNOWN_HASH[:9]}... stands for it')
+            return _UNKNOWN_HASH
+
+    def _look_for_old_poses(self, replace_poses: bool) -> None:
+        """Refuse, or leave out, what the recording already has of what is added."""
+        from icub_leg_fk.tools.bag_reading import messages
+
+        topics = dict(self._topics())
+        own_tf = [connection for connection in self._kept if TF_TOPIC in topics
+                  and (connection.topic, connection.msgtype) == (TF_TOPIC, TF)]
+        topics.pop(TF_TOPIC, None)
+        mine = [connection for connection in self._kept if connection.topic in topics]
+        found = [connection.topic for connection in mine]
+        if own_tf:
+            frames = [output.frames[1].encode() + b'\0' for output in self._outputs]
+            if any(frame in data for _, _, data in messages(self._reader, self._source, own_tf)
+                   for frame in frames):
+                found.append(f'{TF_TOPIC} with '
+                             f'{", ".join(output.frames[1] for output in self._outputs)}')
+                self._own_tf = frozenset(connection.id for connection in own_tf)
+        if found and not replace_poses:
+            raise InputFileError(f'{self._source}: has {", ".join(found)} already; '
+                                 '--replace-poses leaves these out, --only-poses writes the new '
+                                 'ones alone')
+        self._kept = [connection for connection in self._kept if connection not in mine]
+        self._notes += [f'left out: {topic} of the recording' for topic in found]
+
+    def _without_own_transforms(self, data: bytes) -> bytes | None:
+        """Return a TFMessage without the frames that are added; None if nothing is left of it."""
+        message: Any = self._store.deserialize_cdr(data, TF)
+        children = {output.frames[1] for output in self._outputs}
+        kept = [transform for transform in message.transforms
+                if transform.child_frame_id not in children]
+        if len(kept) == len(message.transforms):
+            return data
+        message.transforms = kept
+        return bytes(self._store.serialize_cdr(message, TF)) if kept else None
+
+
+def _reliable(depth: int) -> Any:
+    """Return the QoS with which the node offers its topics."""
+    from rosbags import interfaces
+
+    forever = interfaces.QosTime(2147483647, 4294967295)
+    return interfaces.Qos(
+        interfaces.QosHistory.KEEP_LAST, depth, interfaces.QosReliability.RELIABLE,
+        interfaces.QosDurability.VOLATILE, forever, forever, interfaces.QosLiveliness.AUTOMATIC,
+        forever, False)
+
+
+class _ChainOutput:
+    """What one chain's joint vectors become."""
+
+    def __init__(self, chain: Chain, configuration: Configuration) -> None:
+        from icub_leg_fk.ros.cdr import PoseStampedEncoder, TwistStampedEncoder
+
+        prefix = configuration.frame_prefix
+        self.chain = chain
+        self.pose_topic, self.twist_topic = f'{NODE}/{chain.tip}/pose', f'{NODE}/{chain.tip}/twist'
+        self.frames = prefix + chain.root_frame, prefix + chain.tip_frame
+        self.encode_pose = PoseStampedEncoder(self.frames[0]).encode
+        self.encode_twist = TwistStampedEncoder(self.frames[0]).encode
+
+
+def _configuration(*, chains: list[str], version: str, kinematics_file: str, foot_frame: str,
+                   frame_prefix: str, joint_timeout: float, chain_versions: Mapping[str, str],
+                   twist: bool, tf: bool) -> Configuration:
+    """Return what the node's parameters of the same meaning would amount to."""
+    from icub_leg_fk.kinematics import Catalog
+    from icub_leg_fk.ros.configuration import Configuration, version_parameter
+
+    catalog = Catalog.load(kinematics_file)
+    values = {
+        'chains': chains, 'version': version, 'foot_frame': foot_frame,
+        'frame_prefix': frame_prefix, 'joint_timeout': joint_timeout, 'stamp_source': 'message',
+        'publish_tf': False, 'publish_twist': twist, 'publish_markers': False}
+    values |= {version_parameter(chain): own for chain, own in chain_versions.items()}
+    try:
+        configuration = Configuration.from_parameters(values, catalog)
+    except LegFKError as error:
+        raise LegFKError(_as_options(str(error))) from error
+    return replace(configuration, publish_tf=tf,  # here that needs no tf2_msgs
+                   notes=configuration.notes + catalog.warnings)
+
+
+def _as_options(text: str) -> str:
+    """Return a text on parameters of the node as one on options of the command."""
+    text = re.sub(r'^parameter (\w+)\.version', r'--chain-version \1', text)
+    text = re.sub(r'^parameter (\w+)', lambda match: '--' + match[1].replace('_', '-'), text)
+    return re.sub(r'\(or set (\w+)\.version\)', r'(or --chain-version \1=VERSION)', text)
+
+
+def _check_apart(source: Path, target: Path) -> None:
+    """Refuse to write a bag into, over or around the one that is read."""
+    here, there = source.resolve(), target.resolve()
+    if here == there or here in there.parents or there in here.parents:
+        raise OutputFileError(f'{target}: is the input itself, or a part of it or what it is in; '
+                              'allowed: another place')
+
+
+def _storage(target: Path, asked: str) -> str:
+    """Return the storage that the target's name or an option asks for; empty if neither."""
+    named = STORAGES.get(target.suffix, '')
+    if named and asked not in ('', named):
+        raise OutputFileError(f'{target}: is a name for {named}, and --storage is {asked}; '
+                              'allowed: one that agrees, or a name without such an ending')
+    return named or asked
+
+
+def _has_mcap(bag: Path) -> bool:
+    if not bag.is_dir():
+        return bag.suffix == '.mcap'
+    return any('.mcap' in entry.suffixes for entry in bag.iterdir())
+
+
+def _is_bag(path: Path) -> bool:
+    """Return whether a path is a bag and nothing more, so that replacing it loses only a bag."""
+    if path.is_symlink():
+        return False
+    if path.is_file():
+        return path.suffix in STORAGES
+    names = {entry.name for entry in path.iterdir()
+             if entry.is_file() and not entry.is_symlink()}
+    kept = {name for name in names if not re.search(r'\.(mcap|db3)(\.zstd)?(-wal|-shm)?$', name)}
+    return (kept == {'metadata.yaml'}
+            and len(names) == len(list(path.iterdir())))
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -56,15 +453,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='bags to work on at a time (default: 1)')
     parser.add_argument('--force', action='store_true',
                         help='replace an existing output bag, once the new one is complete')
-    parser.add_argument('--joint-topic', metavar='TOPIC', default='/joint_states',
-                        help='topic of the joint states (default: /joint_states)')
+    parser.add_argument('--joint-topic', metavar='TOPIC', help='topic of the joint states '
+                        '(default: /joint_states, or the only one there is)')
     parser.add_argument('--chains', metavar='CHAIN', nargs='+', default=['left_leg', 'right_leg'],
                         help='chains to add (default: left_leg right_leg)')
     parser.add_argument('--version', metavar='VERSION', default=DEFAULT_VERSION,
                         help=f'version of the chains (default: {DEFAULT_VERSION})')
     add_chain_version(parser)
-    parser.add_argument('--foot-frame', metavar='{dh,sole}', default='dh',
-                        help="axes of the feet: the table's last frame (the default), or the sole")
+    parser.add_argument('--foot-frame', metavar='FRAME', default='dh', help='axes of the feet: '
+                        "dh, the table's last frame (the default), sole, or another of your file")
     parser.add_argument('--frame-prefix', metavar='PREFIX', default='',
                         help='put before every frame id')
     parser.add_argument('--joint-timeout', metavar='S', type=float, default=0.5,
@@ -75,6 +472,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--tf', action='store_true', help='also add the poses to /tf')
     parser.add_argument('--only-poses', action='store_true',
                         help='leave out everything but what is added')
+    parser.add_argument('--replace-poses', action='store_true',
+                        help='leave out the poses that the bag has already')
     parser.add_argument('--storage', metavar='{mcap,sqlite3}', choices=('mcap', 'sqlite3'),
                         help='storage of the new bag (default: as OUT says, or as in the old one)')
     add_kinematics_file(parser)
@@ -82,12 +481,102 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Convert the bags."""
-    from icub_leg_fk.tools.bags.conversion import Conversion
+    from icub_leg_fk.tools.signals import stop_on_signals
 
     tasks = _tasks(args)
-    conversion = Conversion(_configuration(args), args.joint_topic, args.only_poses,
-                            args.storage or '', args.force)
-    return _convert(tasks, conversion, args.jobs)
+    options = {
+        'chains': args.chains, 'version': args.version,
+        'chain_versions': own_versions(args, args.chains),
+        'kinematics_file': args.kinematics_file or '', 'foot_frame': args.foot_frame,
+        'frame_prefix': args.frame_prefix, 'joint_timeout': args.joint_timeout,
+        'joint_topic': args.joint_topic, 'twist': args.twist, 'tf': args.tf,
+        'only_poses': args.only_poses, 'replace_poses': args.replace_poses,
+        'storage': args.storage or '', 'force': args.force}
+    with stop_on_signals():
+        if len(tasks) == 1:
+            with _progress() as progress:
+                summary = add_foot_poses(*tasks[0], **options, progress=progress)
+            print('\n'.join(_summary_lines(summary)))
+            return 0
+        failed = False
+        for (source, _), outcome in _outcomes(tasks, options, args.jobs):
+            if isinstance(outcome, Summary):
+                print('\n'.join(_summary_lines(outcome)), flush=True)
+            else:
+                failed = True
+                line = ' '.join(str(outcome).split())
+                named = line if line.startswith(str(source)) else f'{source}: {line}'
+                print(f'leg_fk: error: {named}', file=sys.stderr, flush=True)
+        return 2 if failed else 0
+
+
+def _outcomes(tasks: Sequence[tuple[Path, Path]], options: Mapping[str, Any], jobs: int
+              ) -> Iterator[tuple[tuple[Path, Path], Summary | Exception]]:
+    """Yield each task with what came of it, some worked on at a time."""
+    if jobs == 1:
+        for task in tasks:
+            try:
+                yield task, add_foot_poses(*task, **options)
+            except LegFKError as error:
+                yield task, error
+        return
+    from concurrent.futures import as_completed, ProcessPoolExecutor
+    from concurrent.futures.process import BrokenProcessPool
+    from multiprocessing import active_children, get_context
+
+    pool = ProcessPoolExecutor(min(jobs, len(tasks)), get_context('spawn'), _begin_worker)
+    try:
+        futures = {pool.submit(add_foot_poses, *task, **options): task for task in tasks}
+        for future in as_completed(futures):
+            try:
+                yield futures[future], future.result()
+            except BrokenProcessPool:
+                yield futures[future], LegFKError('not done: a worker was killed')
+            except LegFKError as error:
+                yield futures[future], error
+        pool.shutdown()
+    except BaseException:
+        for worker in active_children():
+            worker.terminate()
+        pool.shutdown(cancel_futures=True)
+        raise
+
+
+def _begin_worker() -> None:
+    """Let a worker that is told to stop take back what it has begun."""
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the command tells its workers itself
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))
+
+
+def _tasks(args: argparse.Namespace) -> list[tuple[Path, Path]]:
+    """Return which bag is to become which."""
+    if args.out_dir is None:
+        if len(args.bags) != 2:
+            count = f'{len(args.bags)} bag{"s" * (len(args.bags) != 1)}'
+            raise LegFKError(f'{count} without --out-dir; allowed: two, IN and OUT')
+        source, target = args.bags
+        return [(Path(source), Path(target))]
+    out_dir = Path(args.out_dir)
+    try:
+        out_dir.mkdir(exist_ok=True)
+    except OSError as error:
+        raise OutputFileError(f'--out-dir {out_dir}: {error.strerror}') from error
+    tasks = [(Path(bag), out_dir / _name(Path(bag), args.storage)) for bag in args.bags]
+    targets = [target for _, target in tasks]
+    for target in targets:
+        if targets.count(target) > 1:
+            raise OutputFileError(f'{target}: several bags would get this name; allowed: one')
+    return tasks
+
+
+def _name(bag: Path, storage: str | None) -> str:
+    """Return the name of the new bag: that of the old one, with the ending of its storage."""
+    stem, ending = os.path.splitext(os.path.basename(os.path.abspath(bag)))
+    if storage and ending in STORAGES:
+        return stem + next(ending for ending, name in STORAGES.items() if name == storage)
+    return stem + ending
 
 
 def _positive_integer(text: str) -> int:
@@ -96,95 +585,36 @@ def _positive_integer(text: str) -> int:
     return int(text)
 
 
-def _tasks(args: argparse.Namespace) -> list[Task]:
-    """Return which bag is to become which."""
-    from icub_leg_fk.tools.bags.jobs import Task
+class _progress:
+    """Shows the share that is done on stderr, if that is a terminal."""
 
-    if args.out_dir is None:
-        if len(args.bags) != 2:
-            raise LegFKError(f'found {len(args.bags)} bags without --out-dir, allowed: '
-                             'two, IN and OUT')
-        source, target = args.bags
-        return [Task(Path(source), Path(target))]
-    tasks = [Task(Path(bag), Path(args.out_dir) / _name(Path(bag), args.storage))
-             for bag in args.bags]
-    targets = [task.target for task in tasks]
-    for target in targets:
-        if targets.count(target) > 1:
-            raise OutputFileError(f'{target}: found several bags that would get this name, '
-                                  'allowed: one')
-    return tasks
+    def __enter__(self) -> Callable[[float], None] | None:
+        self._visible = sys.stderr is not None and sys.stderr.isatty()
+        return self._show if self._visible else None
+
+    def _show(self, share: float) -> None:
+        print(f'\r{100 * min(share, 1.0):3.0f} % \033[K', end='', file=sys.stderr, flush=True)
+
+    def __exit__(self, *_: object) -> None:
+        if self._visible:
+            print('\r\033[K', end='', file=sys.stderr, flush=True)
 
 
-def _name(bag: Path, storage: str | None) -> str:
-    """Return the name of the new bag: that of the old one, with the ending of its storage."""
-    from icub_leg_fk.tools.bags.reader import KINDS
+def _summary_lines(summary: Summary) -> list[str]:
+    """Return the closing summary, line by line."""
+    from icub_leg_fk.tools.text import columns, indented
 
-    name = re.sub(r'(\.mcap|\.db3)\.zstd$', r'\1', os.path.basename(os.path.abspath(bag)))
-    stem, ending = os.path.splitext(name)
-    if storage and ending in KINDS:
-        return stem + next(ending for ending, kind in KINDS.items() if kind == storage)
-    return name
-
-
-def _configuration(args: argparse.Namespace) -> Configuration:
-    """Return what the node's parameters of the same meaning would amount to."""
-    from dataclasses import replace
-
-    from icub_leg_fk.kinematics import Catalog
-    from icub_leg_fk.ros.configuration import Configuration, version_parameter
-
-    catalog = Catalog.load(args.kinematics_file)
-    values = {
-        'chains': args.chains, 'version': args.version, 'foot_frame': args.foot_frame,
-        'frame_prefix': args.frame_prefix, 'joint_timeout': args.joint_timeout,
-        'stamp_source': 'message', 'publish_tf': False, 'publish_twist': args.twist,
-        'publish_markers': False}
-    values |= {version_parameter(chain): version
-               for chain, version in own_versions(args, args.chains).items()}
-    try:
-        configuration = Configuration.from_parameters(values, catalog)
-    except LegFKError as error:
-        raise LegFKError(_as_options(str(error))) from error
-    return replace(configuration, publish_tf=args.tf)  # here that needs no broadcaster
-
-
-def _as_options(text: str) -> str:
-    """Return a text on parameters of the node as one on options of the command."""
-    text = re.sub(r'^parameter (\w+)\.version', r'--chain-version \1', text)
-    text = re.sub(r'^parameter (\w+)', lambda match: '--' + match[1].replace('_', '-'), text)
-    return re.sub(r'\(or set (\w+)\.version\)', r'(or --chain-version \1=VERSION)', text)
-
-
-def _convert(tasks: list[Task], conversion: Conversion, jobs: int) -> int:
-    """Convert the bags, tell about each, and return the exit status."""
-    from icub_leg_fk.tools.bags.conversion import Summary
-    from icub_leg_fk.tools.bags.jobs import convert_all, convert_one
-    from icub_leg_fk.tools.bags.report import ProgressBar, summary_lines
-
-    bar = ProgressBar()
-    status = 0
-
-    def tell(task: Task, outcome: Outcome) -> None:
-        nonlocal status
-        bar.clear()
-        if isinstance(outcome, Summary):
-            print('\n'.join(summary_lines(task.source, outcome)), flush=True)
-            status = max(status, PARTLY_READ if outcome.damage else 0)
-        elif len(tasks) == 1:
-            raise LegFKError(outcome)
-        else:
-            line = ' '.join(outcome.split())
-            print(f'leg_fk: error: {task.source}: {line}', file=sys.stderr, flush=True)
-            status = 2
-
-    try:
-        if jobs > 1 and len(tasks) > 1:
-            convert_all(tasks, conversion, jobs, bar.show, tell)
-        else:
-            for index, task in enumerate(tasks):
-                bar.span = (index / len(tasks), (index + 1) / len(tasks))
-                tell(task, convert_one(task, conversion, bar.show))
-    finally:
-        bar.clear()
-    return status
+    rows = [(str(summary.copied), 'messages copied')]
+    rows += [(str(count), f'added on {topic}') for topic, count in summary.added.items()]
+    rows += [(str(count), 'time steps back: held joints forgotten' if reason == 'time_jump'
+              else f'joint states rejected: {reason}')
+             for reason, count in summary.rejected.items()]
+    rows += [(str(count), f'joint states gave no {"twist" if reason == "no_velocity" else "pose"} '
+              f'of {chain}: {reason} ({joints})')
+             for chain, reasons in summary.held_back.items()
+             for reason, (count, joints) in reasons.items()]
+    lines = [f'{summary.source} -> {summary.target}', *indented(columns(rows))]
+    lines += indented([f'note: {note}' for note in summary.notes])
+    speed = summary.recorded / max(summary.took, 1e-9)
+    return [*lines, f'  {summary.recorded:.3f} s of recording in {summary.took:.3f} s, '
+            f'{speed:.1f} seconds of recording per second']

@@ -1,43 +1,87 @@
-"""Writing a file so that it is there whole or not at all."""
+"""Writing a file or a bag so that it is there whole or not at all."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import os
 from pathlib import Path
+import shutil
+import tempfile
 from typing import BinaryIO
 
 from icub_leg_fk.errors import OutputFileError
+from icub_leg_fk.tools.signals import held_signals
 
 
 @contextmanager
-def whole_file(path: str | Path) -> Iterator[BinaryIO]:
-    """Give a file beside the one to write; it takes that one's place when the block ends well.
+def whole_path(path: str | Path, *, force: bool,
+               may_replace: Callable[[Path], bool] = Path.is_file) -> Iterator[Path]:
+    """Give a path to make a file or directory at; it takes its place when the block ends well.
+
+    The work is done in a hidden directory beside the target, of which nothing is left.
+
+    Args:
+        path: the target; its directory must exist.
+        force: whether an existing target is replaced.
+        may_replace: whether what stands there may be replaced at all.
 
     Raises:
-        OutputFileError: it cannot be written, or something else than a file stands there.
+        OutputFileError: the target exists, or it cannot be written.
     """
     target = Path(os.path.realpath(path))
-    part = target.with_name(f'.{target.name}.{os.getpid()}.part')
+    check_target(path, force=force, may_replace=may_replace)
     try:
-        if target.exists() and not target.is_file():
-            raise OutputFileError(f'{path}: found something else than a file, allowed: a file')
+        work = Path(tempfile.mkdtemp(prefix=f'.{target.name}.', suffix='.part',
+                                     dir=target.parent))
         try:
-            with part.open('wb') as stream:
-                yield stream
-            part.replace(target)
+            new = work / target.name
+            yield new
+            check_target(path, force=force, may_replace=may_replace)
+            with held_signals():
+                if target.is_dir():
+                    target.rename(work / 'replaced')
+                new.replace(target)
         finally:
-            part.unlink(missing_ok=True)
+            shutil.rmtree(work, ignore_errors=True)
     except OSError as error:
         raise OutputFileError(f'{path}: {error.strerror or error}') from error
 
 
-def write_text(path: str | Path, text: str) -> None:
+def check_target(path: str | Path, *, force: bool,
+                 may_replace: Callable[[Path], bool] = Path.is_file) -> None:
+    """Refuse a target that `whole_path` would refuse, before any work is done.
+
+    Raises:
+        OutputFileError: it exists, or its directory does not.
+    """
+    target = Path(os.path.realpath(path))
+    if not target.parent.is_dir():
+        raise OutputFileError(f'{path}: there is no directory {target.parent}')
+    if os.path.lexists(target):
+        if not may_replace(target):
+            raise OutputFileError(f'{path}: exists already and is something else than what would '
+                                  'be written; nothing replaces it')
+        if not force:
+            raise OutputFileError(f'{path}: exists already; --force replaces it')
+
+
+@contextmanager
+def whole_file(path: str | Path, *, force: bool) -> Iterator[BinaryIO]:
+    """Give a stream to write a file with; the file is there when the block ends well.
+
+    Raises:
+        OutputFileError: as for `whole_path`.
+    """
+    with whole_path(path, force=force) as new, new.open('wb') as stream:
+        yield stream
+
+
+def write_text(path: str | Path, text: str, *, force: bool) -> None:
     """Write a text file, whole or not at all.
 
     Raises:
-        OutputFileError: as for `whole_file`.
+        OutputFileError: as for `whole_path`.
     """
-    with whole_file(path) as stream:
+    with whole_file(path, force=force) as stream:
         stream.write(text.encode())

@@ -20,17 +20,13 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from icub_leg_fk.kinematics import Catalog, Chain
-    from icub_leg_fk.tools.plot_bag import BagTracks
-    from icub_leg_fk.tools.recording import ChainTrack
+    from icub_leg_fk.tools.recording import ChainTrack, Tracks
 
 HELP = 'a picture of the feet over time and of the legs in space, from a bag or a CSV file'
 EXAMPLES = """\
 INPUT is a rosbag2 bag (directory, .mcap or .db3) with JointState messages, read by the node's
 own rules, or a CSV file with a column `time` in seconds and one column per joint, in radians;
 other columns are ignored. Gaps and joints outside their documented ranges are marked.
-
-exit status: 0, 1 if a part of a bag could not be read (the picture has all the rest), 2 if there
-is no picture.
 
 examples:
   leg_fk plot walking.csv
@@ -40,7 +36,6 @@ examples:
 
 DEFAULT_CHAINS = ('left_leg', 'right_leg')
 MAX_INSTANTS = 4
-PARTLY_READ = 1  # the exit status
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -76,8 +71,8 @@ def run(args: argparse.Namespace) -> int:
     output = args.output or Path(f'{args.input.resolve().stem}.png')
     check_output(output, args.force)
     if not args.input.exists():
-        raise InputFileError(f'{args.input}: found nothing of that name, allowed: a bag or a CSV '
-                             'file')
+        raise InputFileError(f'{args.input}: there is no such file or directory; allowed: a bag '
+                             'or a CSV file')
     catalog = Catalog.load(args.kinematics_file)
     chains = _chosen_chains(catalog, args)
     roots = {chain.root_frame for chain in chains}
@@ -94,10 +89,9 @@ def run(args: argparse.Namespace) -> int:
     save_picture(lambda: feet_figure(tracks, instants, title, soled), output)
     poses = ', '.join(f'{len(track.times)} poses of {track.chain.tip}' for track in tracks)
     print(f'{output}: {poses}')
-    for text in (*(f'not drawn: {chain}' for chain in found.poseless),
-                 *(f'not all could be read: {problem}' for problem in found.damage)):
-        print(f'leg_fk: note: {text}', file=sys.stderr)
-    return PARTLY_READ if found.damage else 0
+    for chain in found.poseless:
+        print(f'leg_fk: note: not drawn: {chain}', file=sys.stderr)
+    return 0
 
 
 def telling_instants(tracks: Sequence[ChainTrack]) -> list[float]:
@@ -131,9 +125,8 @@ def _chosen_chains(catalog: Catalog, args: argparse.Namespace) -> list[Chain]:
                           args.foot_frame) for name in dict.fromkeys(names)]
 
 
-def _read(path: Path, chains: Sequence[Chain], topic: str | None) -> BagTracks:
-    from icub_leg_fk.tools.plot_bag import BagTracks, read_bag
-    from icub_leg_fk.tools.recording import read_csv
+def _read(path: Path, chains: Sequence[Chain], topic: str | None) -> Tracks:
+    from icub_leg_fk.tools.recording import read_bag, read_csv, Tracks
 
     if path.suffix.lower() != '.csv':
         return read_bag(path, chains, topic)
@@ -141,7 +134,7 @@ def _read(path: Path, chains: Sequence[Chain], topic: str | None) -> BagTracks:
         raise LegFKError(f'--joint-topic: {path} is a CSV file, which has no topics')
     joints = dict.fromkeys(name for chain in chains for name in chain.joint_names)
     recording = read_csv(path, joints)
-    return BagTracks([recording.track(chain) for chain in chains])
+    return Tracks([recording.track(chain) for chain in chains])
 
 
 def _checked(instants: list[float], tracks: Sequence[ChainTrack]) -> list[float]:

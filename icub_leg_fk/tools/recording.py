@@ -1,11 +1,11 @@
-"""Joint recordings: what joints did over time, from a CSV file or made, and a chain's share."""
+"""Joint recordings: what joints did over time, from a bag, a CSV file or made."""
 
 from __future__ import annotations
 
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 import math
 from pathlib import Path
@@ -16,7 +16,9 @@ from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
 import numpy as np
 
-TIME = 'time'
+TIMES = ('time', 'Time', 'timestamp')
+EPOCH = 1e8  # s; times beyond it count from 1970 and not from the start
+_DELIMITERS = ',;\t'
 
 
 @dataclass(frozen=True)
@@ -67,44 +69,117 @@ class ChainTrack:
         return self.chain.poses(self.positions)
 
 
-def read_csv(path: str | Path, joint_names: Iterable[str]) -> JointRecording:
-    """Read a CSV file: a header, a column `time` [s] and one column per joint [rad].
+@dataclass
+class Tracks:
+    """What chains did in a recording.
 
-    Other columns are ignored; there may be any, in any order.
+    Attributes:
+        tracks: one per chain that has a pose at all; times from the first pose on.
+        poseless: chains without a pose, and the joints that were missing.
+    """
+
+    tracks: list[ChainTrack] = field(default_factory=list)
+    poseless: list[str] = field(default_factory=list)
+
+
+class _Clock:
+    """Knows when the bag received the present message, for one without a stamp [ns]."""
+
+    now = 0
+
+
+def read_bag(path: Path, chains: Sequence[Chain], topic: str | None) -> Tracks:
+    """Return what some chains did in a bag, by the node's own input rules.
+
+    Args:
+        path: directory of a rosbag2 bag, or one of its files.
+        chains: the chains wanted.
+        topic: topic of the joint states; None for `/joint_states`, or the only one there is.
+
+    Raises:
+        InputFileError: the bag cannot be read, has no such topic, or no chain has a pose.
+    """
+    from icub_leg_fk.ros.configuration import DEFAULT_TIMEOUT
+    from icub_leg_fk.ros.joint_input import JointInput
+    from icub_leg_fk.tools.bag_reading import joint_connections, messages, open_bag
+
+    stamps = [array('q') for _ in chains]
+    positions = [array('d') for _ in chains]
+    clock = _Clock()
+    joint_input = JointInput(chains, DEFAULT_TIMEOUT, lambda: clock.now)
+    with open_bag(path) as reader:
+        for _, clock.now, data in messages(reader, path, joint_connections(reader, path, topic)):
+            for vector in joint_input.feed(data):
+                stamps[vector.chain].append(vector.sec * 1_000_000_000 + vector.nanosec)
+                positions[vector.chain].extend(vector.positions)
+    start = min((stamp[0] for stamp in stamps if stamp), default=0)
+    found = Tracks()
+    for index, chain in enumerate(chains):
+        if stamps[index]:
+            times = (np.frombuffer(stamps[index], dtype=np.int64) - start) / 1e9
+            found.tracks.append(ChainTrack(
+                chain, times, np.frombuffer(positions[index]).reshape(len(times), -1)))
+        else:
+            known = joint_input.known_joints(index)
+            missing = [name for name in chain.joint_names if name not in known]
+            found.poseless.append(f'{chain.name} needs '
+                                  f'{", ".join(missing) or "joint positions that are finite"}')
+    if not found.tracks:
+        shown = ', '.join(joint_input.names[:20]) or 'none'
+        raise InputFileError(f'{path}: no pose in {joint_input.messages} joint states: '
+                             f'{"; ".join(found.poseless)}; names found: {shown}')
+    return found
+
+
+def read_csv(path: str | Path, joint_names: Iterable[str]) -> JointRecording:
+    """Read a CSV file: a header, a column of times [s] and one column per joint [rad].
+
+    Values are separated by commas, semicolons or tabs; the times are under `time`, `Time` or
+    `timestamp`, and those since 1970 are taken from the first one on. Other columns are ignored.
 
     Args:
         path: the file.
         joint_names: the joints wanted, each once.
 
     Raises:
-        InputFileError: the file cannot be read, a column is missing or stands twice, or a value
+        InputFileError: the file cannot be read, a column is missing or appears twice, or a value
             is not what it must be; names file, line and column.
     """
     joints = tuple(joint_names)
     values = array('d')
     try:
         with open(path, encoding='utf-8-sig', newline='') as stream:
-            for row in _rows(str(path), csv.reader(stream), (TIME, *joints)):
+            header = stream.readline()
+            delimiter = max(_DELIMITERS, key=header.count)
+            stream.seek(0)
+            for row in _rows(str(path), csv.reader(stream, delimiter=delimiter), joints):
                 values.extend(row)
     except OSError as error:
         raise InputFileError(f'{path}: {error.strerror or error}') from error
     except (UnicodeDecodeError, csv.Error) as error:
-        raise InputFileError(f'{path}: found no CSV text ({error}), '
+        raise InputFileError(f'{path}: is not CSV text ({error}); '
                              'allowed: a header and rows of numbers') from error
     table = np.frombuffer(values).reshape(-1, 1 + len(joints))
-    return JointRecording(joints, table[:, 0], table[:, 1:])
+    times = table[:, 0] - (table[0, 0] if table[0, 0] > EPOCH else 0.0)
+    return JointRecording(joints, times, table[:, 1:])
 
 
-def _rows(file: str, reader: Any, columns: Sequence[str]) -> Iterator[list[float]]:
-    """Yield the wanted columns of every row that a `csv.reader` gives, as numbers."""
+def _rows(file: str, reader: Any, joints: Sequence[str]) -> Iterator[list[float]]:
+    """Yield time and joints of every row that a `csv.reader` gives, as numbers."""
     header = [name.strip() for name in next(reader, [])]
     if not any(header):
-        raise InputFileError(f'{file}:1: found no header, allowed: {", ".join(columns)}')
+        raise InputFileError(f'{file}:1: no header; allowed: time, {", ".join(joints)}')
+    shown = ', '.join(repr(name)[1:-1][:40] for name in header[:20])
+    time = next((name for name in TIMES if name in header), None)
+    if time is None:
+        raise InputFileError(f'{file}:1: no column of times in the header ({shown}); allowed: '
+                             f'{" or ".join(TIMES)}')
+    columns = (time, *joints)
     for name in columns:
         if header.count(name) != 1:
-            found = 'the column twice' if name in header else 'no such column'
-            raise InputFileError(
-                f'{file}:1: column {name}: found {found}, allowed: {", ".join(columns)}')
+            found = 'appears twice' if name in header else 'is missing'
+            raise InputFileError(f'{file}:1: column {name} {found} in the header ({shown}); '
+                                 f'needed: {", ".join(columns)}')
     places = [header.index(name) for name in columns]
     before = -math.inf
     for row in reader:
@@ -115,16 +190,16 @@ def _rows(file: str, reader: Any, columns: Sequence[str]) -> Iterator[list[float
             number = _number(row, place)
             if number is None:
                 found = repr(row[place]) if place < len(row) else f'a row of {len(row)} values'
-                raise InputFileError(f'{file}:{reader.line_num}: column {name}: found {found}, '
+                raise InputFileError(f'{file}:{reader.line_num}: column {name}: {found}; '
                                      'allowed: a finite number')
             numbers.append(number)
         if numbers[0] < before:
-            raise InputFileError(f'{file}:{reader.line_num}: column {TIME}: found {numbers[0]} '
-                                 f'after {before}, allowed: times that do not decrease')
+            raise InputFileError(f'{file}:{reader.line_num}: column {time}: {numbers[0]} after '
+                                 f'{before}; allowed: times that do not decrease')
         before = numbers[0]
         yield numbers
     if before == -math.inf:
-        raise InputFileError(f'{file}: found no rows, allowed: at least one after the header')
+        raise InputFileError(f'{file}: no rows; allowed: at least one after the header')
 
 
 def _number(row: list[str], place: int) -> float | None:

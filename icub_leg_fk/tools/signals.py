@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 import signal
+import threading
 from types import FrameType
 
 _STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -27,7 +28,10 @@ def stop_on_signals() -> Iterator[None]:
 
 @contextmanager
 def held_signals() -> Iterator[None]:
-    """While it lasts, the signals that end the process wait."""
+    """While it lasts, the signals that end the process wait; they are the main thread's alone."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
     arrived: list[int] = []
     before = {number: signal.signal(number, lambda number, frame: arrived.append(number))
               for number in _STOPS}

@@ -39,7 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_chain_version(parser)
     parser.add_argument('--name', help='name of the robot (default: icub, or that of your file)')
     parser.add_argument('-o', '--output', metavar='FILE',
-                        help='file to write, or to replace (default: standard output)')
+                        help='file to write (default: standard output)')
+    parser.add_argument('--force', action='store_true', help='replace an existing file')
     add_kinematics_file(parser)
 
 
@@ -56,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
     text = urdf_text(robot, selections)
     if args.output:
         from icub_leg_fk.tools.output_file import write_text
-        write_text(args.output, text)
+        write_text(args.output, text, force=args.force)
     else:
         print(text, end='')
     return 0

@@ -93,7 +93,8 @@ def save_picture(draw: Callable[[], Figure], path: Path, dpi: int = 150) -> None
     # Without dates the same picture is the same file.
     metadata = {'svg': {'Date': None}, 'pdf': {'CreationDate': None}}.get(kind)
     try:
-        with whole_file(path) as stream, rc_context(_SETTINGS):  # type: ignore[arg-type]
+        with (whole_file(path, force=True) as stream,
+              rc_context(_SETTINGS)):  # type: ignore[arg-type]
             draw().savefig(stream, format=kind, dpi=dpi, metadata=metadata)
     except ValueError as error:
         raise LegFKError(f'{path}: cannot be drawn: {error}') from error

@@ -1,0 +1,238 @@
+"""ROS messages to and from their CDR bytes (OMG CDR, as rosidl lays them out); free of rclpy.
+
+Read is sensor_msgs/JointState, bounds-checked, since its bytes come from the network: every length
+is compared with what is there before anything is read or allocated. Its fields are encapsulation
+(4 bytes), stamp sec and nanosec, frame_id, name[], position[], velocity[], effort[]; alignment
+counts from the fifth byte. Padding may hold anything: Fast CDR leaves in it what was in the buffer
+before. What Fast CDR takes and this refuses: encapsulations other than plain CDR, in which no ROS
+middleware sends a JointState; a string without NUL at its end, or with one before it.
+
+Written are PoseStamped, TwistStamped and TFMessage, little-endian: all but stamps and numbers is
+prepared once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import struct
+from typing import NamedTuple
+
+from icub_leg_fk.errors import MalformedMessageError
+from icub_leg_fk.kinematics.solver import Pose, Twist
+
+BYTE_ORDERS = {b'\x00\x01': '<', b'\x00\x00': '>'}
+HEADER = 4  # bytes of the encapsulation, from whose end alignment counts
+STAMP_END = 12  # encapsulation and stamp; frame_id follows
+
+_ENCAPSULATION = b'\x00\x01\x00\x00'
+
+
+class JointStateHead(NamedTuple):
+    """What a JointState begins with; as a rule the same in every message of a publisher.
+
+    Attributes:
+        byte_order: `<` or `>`.
+        names: joint names.
+        end: offset of the count of positions, which follows.
+        padding: offset and size of what is skipped for alignment before it.
+    """
+
+    byte_order: str
+    names: tuple[str, ...]
+    end: int
+    padding: tuple[tuple[int, int], ...]
+
+
+class JointStateMessage(NamedTuple):
+    """The fields of a JointState that matter here: stamp, names, positions and velocities."""
+
+    sec: int
+    nanosec: int
+    names: tuple[str, ...]
+    positions: tuple[float, ...]
+    velocities: tuple[float, ...]
+
+
+def decode_head(data: bytes) -> JointStateHead:
+    """Decode a serialized JointState up to its positions.
+
+    Raises:
+        MalformedMessageError: as for `decode_joint_state`.
+    """
+    reader = _Reader(data)
+    reader.stamp()
+    names = reader.names()
+    return JointStateHead(reader.byte_order, names, reader.align(4), tuple(reader.padding))
+
+
+def decode_joint_state(data: bytes) -> JointStateMessage:
+    """Decode a serialized JointState.
+
+    Raises:
+        MalformedMessageError: the bytes end too early, a length is absurd, or the encoding is
+            not plain CDR; names the field.
+    """
+    reader = _Reader(data)
+    sec, nanosec = reader.stamp()
+    names = reader.names()
+    positions, velocities = reader.doubles('position'), reader.doubles('velocity')
+    reader.doubles('effort')
+    return JointStateMessage(sec, nanosec, names, positions, velocities)
+
+
+class PoseStampedEncoder:
+    """Serializes geometry_msgs/PoseStamped messages of one frame id.
+
+    Args:
+        frame_id: the frame the poses are given in.
+    """
+
+    def __init__(self, frame_id: str) -> None:
+        self._frame_id = _aligned(STAMP_END - HEADER, _string(frame_id), 8)
+        self._pack = struct.Struct(f'<4siI{len(self._frame_id)}s7d').pack
+
+    def encode(self, sec: int, nanosec: int, pose: Pose) -> bytes:
+        """Return the bytes of one message.
+
+        Args:
+            sec: seconds of the stamp.
+            nanosec: nanoseconds of the stamp.
+            pose: x, y, z [m], qx, qy, qz, qw.
+        """
+        return self._pack(_ENCAPSULATION, sec, nanosec, self._frame_id, *pose)
+
+
+class TwistStampedEncoder:
+    """Serializes geometry_msgs/TwistStamped messages of one frame id.
+
+    Args:
+        frame_id: the frame in whose axes the twists are given.
+    """
+
+    def __init__(self, frame_id: str) -> None:
+        self._frame_id = _aligned(STAMP_END - HEADER, _string(frame_id), 8)
+        self._pack = struct.Struct(f'<4siI{len(self._frame_id)}s6d').pack
+
+    def encode(self, sec: int, nanosec: int, twist: Twist) -> bytes:
+        """Return the bytes of one message.
+
+        Args:
+            sec: seconds of the stamp.
+            nanosec: nanoseconds of the stamp.
+            twist: vx, vy, vz [m/s], wx, wy, wz [rad/s].
+        """
+        return self._pack(_ENCAPSULATION, sec, nanosec, self._frame_id, *twist)
+
+
+class TFMessageEncoder:
+    """Serializes tf2_msgs/TFMessage messages of some transforms with one stamp.
+
+    Args:
+        frames: frame id and child frame id of each transform.
+    """
+
+    def __init__(self, frames: Sequence[tuple[str, str]]) -> None:
+        self._frames: list[bytes] = []
+        layout, at = '<4sI', 4
+        for frame_id, child_frame_id in frames:
+            start = at + STAMP_END - HEADER
+            ids = _aligned(start, _string(frame_id), 4)
+            ids = _aligned(start, ids + _string(child_frame_id), 8)
+            self._frames.append(ids)
+            layout += f'iI{len(ids)}s7d'
+            at = start + len(ids) + 56
+        self._pack = struct.Struct(layout).pack
+
+    def encode(self, sec: int, nanosec: int, poses: Sequence[Pose]) -> bytes:
+        """Return the bytes of one message.
+
+        Args:
+            sec: seconds of the stamp.
+            nanosec: nanoseconds of the stamp.
+            poses: x, y, z [m], qx, qy, qz, qw of each child frame.
+        """
+        fields: list[object] = []
+        for ids, pose in zip(self._frames, poses, strict=True):
+            fields += (sec, nanosec, ids, *pose)
+        return self._pack(_ENCAPSULATION, len(self._frames), *fields)
+
+
+class _Reader:
+    """A position in the bytes of a JointState that refuses to move past their end."""
+
+    def __init__(self, data: bytes) -> None:
+        byte_order = BYTE_ORDERS.get(bytes(data[:2]))
+        if byte_order is None:
+            raise MalformedMessageError(f'JointState has the encapsulation 0x{data[:2].hex()}; '
+                                        'allowed: 0x0000, 0x0001')
+        self.byte_order = byte_order
+        self.padding: list[tuple[int, int]] = []
+        self._data = data
+        self._at = HEADER
+
+    def align(self, size: int) -> int:
+        """Return the next offset that is a multiple of size, and go there."""
+        padding = (HEADER - self._at) % size
+        if padding:
+            self.padding.append((self._at, padding))
+            self._at += padding
+        return self._at
+
+    def stamp(self) -> tuple[int, int]:
+        """Return seconds and nanoseconds."""
+        sec, nanosec = struct.unpack_from(f'{self.byte_order}iI', self._data,
+                                          self._take('header.stamp', 8))
+        return sec, nanosec
+
+    def names(self) -> tuple[str, ...]:
+        """Pass over frame_id and return the names behind it."""
+        self._string('header.frame_id')
+        # A string takes at least its length field: no more of them than a quarter of the rest.
+        return tuple([self._string('name') for _ in range(self._length('name', 4))])
+
+    def doubles(self, field: str) -> tuple[float, ...]:
+        """Return the numbers of a sequence."""
+        count = self._length(field, 8)
+        if count:
+            self.align(8)
+        return struct.unpack_from(f'{self.byte_order}{count}d', self._data,
+                                  self._take(field, 8 * count))
+
+    def _length(self, field: str, item_size: int) -> int:
+        """Return the count of items that follow; they fit in what is left."""
+        self.align(4)
+        count: int = struct.unpack_from(f'{self.byte_order}I', self._data,
+                                        self._take(field, 4))[0]
+        left = len(self._data) - self._at
+        if count * item_size > left:
+            raise MalformedMessageError(f'JointState: {field} has {count} items; allowed: what '
+                                        f'fits in the {left} bytes left')
+        return count
+
+    def _string(self, field: str) -> str:
+        size = self._length(field, 1)
+        start = self._take(field, size)
+        text = self._data[start:self._at]
+        if size and text.find(0) != size - 1:
+            raise MalformedMessageError(f'JointState: {field} is no string that ends with NUL')
+        return text[:-1].decode('utf-8', 'replace')
+
+    def _take(self, field: str, size: int) -> int:
+        """Return the present offset and go on behind as many bytes."""
+        start = self._at
+        self._at = start + size
+        if self._at > len(self._data):
+            raise MalformedMessageError(f'JointState: {field} ends at byte {self._at}; allowed: '
+                                        f'{len(self._data)}')
+        return start
+
+
+def _string(text: str) -> bytes:
+    """Return the bytes of a string: length, text and NUL."""
+    data = text.encode() + b'\x00'
+    return struct.pack('<I', len(data)) + data
+
+
+def _aligned(before: int, data: bytes, size: int) -> bytes:
+    """Return data, which so many bytes stand before, padded so that items of a size can follow."""
+    return data + bytes(-(before + len(data)) % size)

@@ -1,0 +1,226 @@
+"""Opening a recording for `leg_fk bag` and `plot`: by rosbags, or one line on what is wrong.
+
+rosbags (https://ternaris.gitlab.io/rosbags/) reads rosbag2 directories and single .mcap and .db3
+files. What it would pass over, or refuse without a name, is looked at first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+import os
+from pathlib import Path
+import re
+import struct
+import tempfile
+from typing import Any
+
+from icub_leg_fk.errors import InputFileError, MissingDependencyError
+import yaml
+
+try:
+    from rosbags.rosbag2 import Reader
+except ImportError as error:
+    raise MissingDependencyError(
+        'rosbags is not installed, and bags need it: pip install "rosbags>=0.11.9,<0.12" (on '
+        'Ubuntu in a virtual environment made with --system-site-packages)') from error
+
+DEFAULT_TOPIC = '/joint_states'
+JOINT_STATE = 'sensor_msgs/msg/JointState'
+METADATA = 'metadata.yaml'
+
+_MCAP_MAGIC = b'\x89MCAP0\r\n'
+_CLEAN = re.compile(r'/?(?!/)[A-Za-z0-9._/ +@:,=-]*')  # what also sqlite takes as it is
+_MEND = {'.mcap': '`mcap recover` may mend it', '.db3': '`ros2 bag reindex` may mend it'}
+
+
+@contextmanager
+def open_bag(path: str | Path) -> Iterator[Any]:
+    """Give a rosbags reader of a rosbag2 directory or of one of its files.
+
+    Raises:
+        InputFileError: there is nothing that can be read; says why, and what mends it.
+    """
+    path = Path(path)
+    shown = os.fsencode(path).decode(errors='backslashreplace')
+    files = _files(path, shown)
+    for file in files:
+        _check_file(file, shown)
+    if (path / METADATA).is_file():
+        _check_formats(path / METADATA, shown)
+    with tempfile.TemporaryDirectory() as scratch:
+        try:
+            reader: Any = Reader(_clean(path, Path(scratch)))
+            reader.open()
+        except Exception as error:
+            raise unreadable(path, error) from error
+        try:
+            odd = sorted({f'{connection.topic} ({connection.ext.serialization_format})'
+                          for connection in reader.connections
+                          if connection.ext.serialization_format != 'cdr'})
+            if odd:
+                raise InputFileError(f'{shown}: the messages of {", ".join(odd)} are not CDR; '
+                                     'allowed: recordings of ROS 2, which are')
+            yield reader
+        finally:
+            reader.close()
+
+
+def messages(reader: Any, path: str | Path, connections: Sequence[Any]
+             ) -> Iterator[tuple[Any, int, bytes]]:
+    """Yield connection, time of recording [ns] and CDR bytes of each message.
+
+    Raises:
+        InputFileError: the recording is damaged; says how, and what mends it.
+    """
+    source = reader.messages(connections=connections)
+    while True:
+        try:
+            message = next(source)
+        except StopIteration:
+            return
+        except Exception as error:
+            raise unreadable(path, error) from error
+        yield message
+
+
+def joint_connections(reader: Any, path: str | Path, topic: str | None) -> list[Any]:
+    """Return the connections that bring joint states.
+
+    Args:
+        reader: the reader.
+        path: the recording, for errors.
+        topic: topic wanted; None for `/joint_states`, or the only one there is.
+
+    Raises:
+        InputFileError: there is none; lists the topics of that type.
+    """
+    known = sorted({connection.topic for connection in reader.connections
+                    if connection.msgtype == JOINT_STATE})
+    name = topic or (DEFAULT_TOPIC if DEFAULT_TOPIC in known or len(known) != 1 else known[0])
+    found = [connection for connection in reader.connections
+             if (connection.topic, connection.msgtype) == (name, JOINT_STATE)]
+    if not found:
+        there = (f'--joint-topic can be {", ".join(known)}' if known
+                 else f'no topic there is a {JOINT_STATE}')
+        raise InputFileError(f'{path}: no joint states on {name}; {there}')
+    return found
+
+
+def unreadable(path: str | Path, error: Exception) -> InputFileError:
+    """Return the one line on a recording that rosbags cannot read, with what mends it."""
+    path = Path(path)
+    reason = (' '.join(str(error).split()) or type(error).__name__).rstrip('.')
+    if path.is_dir():
+        endings = {suffix for entry in path.iterdir() for suffix in entry.suffixes} & _MEND.keys()
+        if not endings:
+            mend = 'it is no rosbag2 recording'
+        elif (path / METADATA).is_file():
+            mend = _MEND[min(endings, key='.db3'.__eq__)]
+        else:
+            reason = f'it has no {METADATA}, as when the recorder was killed'
+            mend = (f'give its file alone, or let `ros2 bag reindex {path}` write one'
+                    if endings == {'.db3'} else '`mcap recover` mends its file, then '
+                    f'`ros2 bag reindex {path}` writes one')
+    else:
+        mend = _MEND.get(path.suffix, 'allowed: a rosbag2 directory, or a .mcap or .db3 file')
+    return InputFileError(f'{path}: cannot be read: {reason}; {mend}')
+
+
+def _files(path: Path, shown: str) -> list[Path]:
+    """Return the storage files of a recording; refuse what is none."""
+    if not path.exists():
+        raise InputFileError(f'{shown}: there is no such file or directory')
+    if path.is_dir():
+        return sorted(entry for entry in path.iterdir() if entry.suffix in _MEND)
+    with path.open('rb') as stream:
+        if stream.read(7) == b'#ROSBAG':
+            raise InputFileError(f'{shown}: is a ROS 1 bag; `rosbags-convert` makes a ROS 2 '
+                                 'recording of it')
+    if path.suffix == '.zstd':
+        raise InputFileError(f'{shown}: is a compressed file alone; give its directory, or '
+                             'decompress it: zstd -d')
+    return [path]
+
+
+def _check_file(file: Path, shown: str) -> None:
+    """Refuse a storage file of messages that are not of ROS 2, or with some in a log beside it."""
+    log = file.with_name(f'{file.name}-wal')
+    if file.suffix == '.db3' and log.is_file() and log.stat().st_size:
+        raise InputFileError(f'{shown}: {log.name} holds messages that are not in {file.name} '
+                             'yet; this brings them in: sqlite3 '
+                             f"{file.name} 'PRAGMA wal_checkpoint(TRUNCATE)'")
+    if file.suffix != '.mcap':
+        return
+    try:
+        profile, encodings = _mcap_summary(file)
+    except (OSError, struct.error, UnicodeDecodeError, IndexError):
+        return  # rosbags will say what is wrong
+    odd = sorted(f'{topic} ({encoding})' for topic, encoding in encodings.items()
+                 if encoding != 'cdr')
+    if profile == 'ros1' or 'ros1' in encodings.values():
+        raise InputFileError(f'{shown}: is an MCAP file of ROS 1 messages; allowed: of ROS 2')
+    if odd:
+        raise InputFileError(f'{shown}: is an MCAP file with messages that are not CDR: '
+                             f'{", ".join(odd)}; allowed: recordings of ROS 2, which are')
+
+
+def _mcap_summary(file: Path) -> tuple[str, dict[str, str]]:
+    """Return the profile of an MCAP file and the message encodings by topic, from its summary."""
+    with file.open('rb') as stream:
+        head = stream.read(4096)
+        if not head.startswith(_MCAP_MAGIC):
+            return '', {}
+        profile = _string(head, 17)[0]
+        stream.seek(-37, os.SEEK_END)
+        footer = stream.read()
+        start, = struct.unpack_from('<Q', footer, 9)
+        end = stream.tell() - 37
+        if footer[-8:] != _MCAP_MAGIC or not 0 < start < end:
+            return profile, {}
+        stream.seek(start)
+        summary = stream.read(min(end - start, 1 << 26))
+    encodings: dict[str, str] = {}
+    at = 0
+    while at + 9 <= len(summary):
+        kind, (size,) = summary[at], struct.unpack_from('<Q', summary, at + 1)
+        if kind == 0x04:  # a channel: id, schema, topic, encoding
+            topic, encoding_at = _string(summary, at + 13)
+            encodings[topic] = _string(summary, encoding_at)[0]
+        at += 9 + size
+    return profile, encodings
+
+
+def _string(data: bytes, at: int) -> tuple[str, int]:
+    size, = struct.unpack_from('<I', data, at)
+    return data[at + 4:at + 4 + size].decode(), at + 4 + size
+
+
+def _check_formats(metadata: Path, shown: str) -> None:
+    """Refuse topics that are not CDR by their names, which rosbags does not tell."""
+    try:
+        topics = yaml.safe_load(metadata.read_text(encoding='utf-8'))[
+            'rosbag2_bagfile_information']['topics_with_message_count']
+        odd = {topic['topic_metadata']['name']: topic['topic_metadata']['serialization_format']
+               for topic in topics}
+        odd = {topic: kind for topic, kind in odd.items() if kind != 'cdr'}
+    except Exception:  # noqa: BLE001 (rosbags will say what is wrong)
+        return
+    if odd:
+        listed = ', '.join(f'{topic} ({kind})' for topic, kind in odd.items())
+        raise InputFileError(f'{shown}: the messages of {listed} are not CDR; allowed: recordings '
+                             'of ROS 2, which are')
+
+
+def _clean(path: Path, scratch: Path) -> Path:
+    """Return a path that every library takes: itself, or links to it in a scratch directory."""
+    if _CLEAN.fullmatch(str(path)):
+        return path
+    clean = scratch / f'bag{path.suffix if path.suffix in _MEND else ""}'
+    if path.is_dir():
+        clean.mkdir()
+        for entry in path.iterdir():
+            (clean / entry.name).symlink_to(entry.resolve())
+    else:
+        clean.symlink_to(path.resolve())
+    return clean
