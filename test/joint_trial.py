@@ -1,9 +1,11 @@
 """Messages through the model of the rules and through the joint input, side by side."""
 
 from collections import Counter
+from dataclasses import dataclass
 import math
 import struct
 
+from hypothesis import strategies as st
 from icub_leg_fk.errors import MalformedMessageError
 from icub_leg_fk.ros.cdr import decode_joint_state
 from icub_leg_fk.ros.joint_input import JointInput
@@ -86,92 +88,109 @@ class Trial:
                                   if reason != 'empty_position'})
 
 
-class Traffic:
-    """Messages as robots, bridges, bags and strangers send them, from one random generator.
+@dataclass(frozen=True)
+class Publisher:
+    """Somebody who sends JointStates of one form."""
 
-    Some publishers, each with names and lengths of its own, take turns; now and then a message
-    is at fault or the clock is.
-    """
+    names: tuple[str, ...]
+    surplus: int  # positions beyond the names
+    velocities: float  # per name
+    efforts: float
+    frame_id: str
+    order: str
+    extra: int
 
-    def __init__(self, rng, chains):
-        self.rng = rng
-        self.chains = [chain.joint_names for chain in chains]
-        self.joints = list(dict.fromkeys(name for names in self.chains for name in names))
-        self.publishers = [self._publisher() for _ in range(rng.choice((1, 2, 3, 5, 12)))]
-        self.last = {}
-        self.faults = rng.choice((0.0, 0.02, 0.2, 0.6))
-        self.stamp = rng.choice((0, 7, 1_700_000_000, -3, 2**31 - 20)) * SECOND
-        self.step = rng.choice((1, 1_000_000, 10_000_000, 300_000_000))
 
-    def _publisher(self):
-        rng = self.rng
-        names = rng.choice((list(self.joints), list(self.joints), list(rng.choice(self.chains)),
-                            rng.sample(self.joints, rng.randint(1, len(self.joints))), []))
-        names += rng.sample(('', 'wheel', 'läuft', self.joints[0].upper(), self.joints[0] + ' '),
-                            rng.choice((0, 0, 1, 3)))
-        if rng.random() < 0.3:
-            rng.shuffle(names)
-        n = len(names)
-        lengths = n + rng.choice((0, 0, 0, 1, 4)), *rng.choices((0, n, n, n + 2, n // 2), k=2)
-        return (tuple(names), lengths, rng.choice(('', 'base_link')),
-                rng.choice('<<<<<>'), rng.choice((0, 0, 0, 4, 8)))
+@dataclass(frozen=True)
+class Step:
+    """One message: whose, how long after the last, and what is the matter with it."""
 
-    def _values(self, n):
-        return [self.rng.uniform(-0.4, 0.4) for _ in range(n)]
+    publisher: int
+    elapsed: int  # ns
+    fault: str | None
+    at: int  # where the fault is
+    value: float
+    shift: int  # ns
+    padding: int
 
-    def next_message(self):
-        """Return a message, well-formed if not always sensible."""
-        rng = self.rng
-        publisher = rng.choice(self.publishers)
-        names, lengths, frame_id, order, extra = publisher
-        self.stamp += self.step
-        stamp = self.stamp
-        positions, velocities, efforts = map(self._values, lengths)
-        if rng.random() < self.faults:
-            fault = rng.randrange(10)
-            if fault == 0 and positions:
-                positions[rng.randrange(len(positions))] = rng.choice(SPECIAL)
-            elif fault == 1:
-                names, positions = self._spoil(list(names), positions)
-            elif fault == 2:
-                back = rng.choice((0, 1, SECOND // 2, SECOND // 2 + 1, 3 * SECOND, 10**19))
-                self.stamp = max(stamp - back, -2 * SECOND)
-                stamp = self.stamp
-            elif fault == 3:  # one message late, or early
-                stamp += rng.choice((-1, 1)) * rng.choice((1, self.step, SECOND // 2, SECOND))
-            elif fault == 4:
-                self.stamp = stamp = stamp + rng.choice((SECOND // 2, SECOND // 2 + 1, 9 * SECOND))
-            elif fault == 5:
-                stamp = 0
-            elif fault == 6 and velocities:
-                velocities[rng.randrange(len(velocities))] = rng.choice(SPECIAL)
-            elif fault == 7:
-                velocities, efforts = efforts, velocities
-            elif fault == 8:  # the same time again, while others have gone on
-                stamp = self.last.get(publisher, stamp)
-            else:
-                positions = positions[:rng.randint(0, len(positions))]
-        self.last[publisher] = stamp
+
+FAULTS = ('position', 'velocity', 'cut', 'drop', 'repeat', 'reverse', 'swap', 'stranger', 'back',
+          'late', 'zero stamp', 'again', 'no carry')
+
+
+def publishers(chains):
+    """Return a strategy: publishers as on robots, of bridges for parts, and strangers."""
+    own = [chain.joint_names for chain in chains]
+    joints = list(dict.fromkeys(name for names in own for name in names))
+    strangers = ['', 'wheel', 'läuft', joints[0].upper(), joints[0] + ' ']
+    names = st.one_of(
+        st.sampled_from([tuple(joints), *own, ('wheel', *joints, '')]),
+        st.permutations(joints).map(tuple),
+        st.lists(st.sampled_from(joints + strangers), unique=True).map(tuple))
+    per_name = st.sampled_from((0, 1, 1, 1.5, 0.5))
+    return st.lists(st.builds(
+        Publisher, names, st.sampled_from((0, 0, 0, 1, 4)), per_name, per_name,
+        st.sampled_from(('', 'base_link')), st.sampled_from('<<<>'), st.sampled_from((0, 0, 4, 9)),
+    ), min_size=1, max_size=12)
+
+
+def steps(faults):
+    """Return a strategy: a sequence of messages of which this share, 0 to 1, has a fault."""
+    sound = [None] * round(len(FAULTS) * (1 / faults - 1)) if faults else [None]
+    return st.lists(st.builds(
+        Step, st.integers(0, 11), st.sampled_from((1, 10**6, 10**7, 10**7, SECOND // 2)),
+        st.sampled_from((*sound, *(FAULTS if faults else ()))), st.integers(0, 40),
+        st.sampled_from(SPECIAL),
+        st.sampled_from((0, 1, 10**6, SECOND // 2, SECOND // 2 + 1, 3 * SECOND, 10**19)),
+        st.sampled_from((0, 0, 255))), max_size=60)
+
+
+STARTS = st.sampled_from((0, 7, 1_700_000_000, -3, 2**31 - 20))  # s
+
+
+def traffic(publishers, steps, start):
+    """Yield the messages of some publishers who take turns."""
+    time, last = start * SECOND, {}
+    for number, step in enumerate(steps):
+        publisher = publishers[step.publisher % len(publishers)]
+        n = len(publisher.names)
+        names = list(publisher.names)
+        # Numbers that differ from message to message and from joint to joint, within 0.4.
+        positions, velocities, efforts = (
+            [((31 * number + 17 * i) % 81 - 40) / 100 for i in range(int(size))]
+            for size in (n + publisher.surplus, n * publisher.velocities, n * publisher.efforts))
+        at = step.at % n if n else 0
+        time += step.elapsed
+        if step.fault == 'back':
+            time = max(time - step.shift, -2 * SECOND)
+        stamp, carry = time, 0
+        if step.fault == 'position' and n:
+            positions[at] = step.value
+        elif step.fault == 'velocity' and velocities:
+            velocities[at % len(velocities)] = step.value
+        elif step.fault == 'cut':
+            del positions[at:]
+        elif step.fault == 'drop':
+            del names[at:at + 1]
+        elif step.fault == 'repeat' and n:
+            names[-1] = names[at]
+        elif step.fault == 'reverse':
+            names.reverse()
+        elif step.fault == 'swap':
+            velocities, efforts = efforts, velocities
+        elif step.fault == 'stranger':
+            names.insert(at, 'stranger')
+        elif step.fault == 'late':
+            stamp -= step.shift
+        elif step.fault == 'zero stamp':
+            stamp = 0
+        elif step.fault == 'again':
+            stamp = last.get(publisher, stamp)
+        elif step.fault == 'no carry':  # some publishers do not; it is the same time
+            carry = 1 + step.at % 3
+        last[publisher] = stamp
         sec, nanosec = divmod(stamp, SECOND)
-        sec = min(max(sec, -2**31), 2**31 - 1)
-        if rng.random() < 0.05:  # some publishers do not carry over; it is the same time
-            carry = rng.randint(1, 3)
-            sec, nanosec = max(sec - carry, -2**31), nanosec + carry * SECOND
-        return Message(sec, nanosec, names, tuple(positions), tuple(velocities), tuple(efforts),
-                       frame_id, order, extra, rng.choice((0, 0, 0, 255)))
-
-    def _spoil(self, names, positions):
-        """Drop, repeat, swap or add a name."""
-        rng = self.rng
-        how = rng.randrange(4)
-        if how == 0 and names:
-            del names[rng.randrange(len(names))]
-        elif how == 1 and names:
-            names.append(rng.choice(names))
-        elif how == 2:
-            rng.shuffle(names)
-        else:
-            names.append(rng.choice((*self.joints, '', 'stranger')))
-        if rng.random() < 0.7:
-            positions = self._values(len(names))
-        return tuple(names), positions
+        sec = min(max(sec, carry - 2**31), 2**31 - 1)
+        yield Message(sec - carry, nanosec + carry * SECOND, tuple(names), tuple(positions),
+                      tuple(velocities), tuple(efforts), publisher.frame_id, publisher.order,
+                      publisher.extra, step.padding)
