@@ -3,7 +3,7 @@
 import math
 import tracemalloc
 
-from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.kinematics import Catalog, Chain, DHLink
 from icub_leg_fk.ros.joint_input import JointInput
 from joint_model import Message
 import numpy as np
@@ -146,6 +146,17 @@ def test_an_angle_that_is_not_finite_holds_back_just_its_chain(robot, value):
     assert robot.ready(2, ['l_knee']) == [LEFT]
 
 
+@pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf, 1e150, -1e150])
+def test_an_angle_that_is_not_finite_is_refused_where_there_is_no_range_too(value):
+    link = DHLink(a=0.1, d=0.0, alpha=0.0)
+    chain = Chain(name='arm', version='a', root_frame='base', tip='hand', tip_frame='hand',
+                  joint_names=('turn',), links=(link,), T_root_0=np.eye(4), T_n_tip=np.eye(4))
+    joint_input = JointInput([chain], 0.5, lambda: START)
+    assert joint_input.feed(joint_state(0, ['turn'], [value])) == []
+    assert joint_input.counts == {}
+    assert joint_input.chain_counts[0].joints == {'non_finite': {'turn': str(value)}}
+
+
 def test_out_of_range_goes_out_as_it_is_and_is_noted(robot):
     [vector] = robot.send(0, robot.left, [0.0, 0.0, 0.0, 9.0, 0.0, -8.0])
     assert vector.positions == (0.0, 0.0, 0.0, 9.0, 0.0, -8.0)
@@ -179,10 +190,20 @@ def test_publishers_of_different_joints_may_interleave_out_of_order(robot):
     assert robot.reports == []
 
 
-def test_a_joint_older_than_what_is_held_of_it_is_a_step_back(robot):
-    robot.send(10, robot.both)
-    assert robot.ready(9, robot.left[:1]) == []
-    assert robot.input.counts == {'time_jump': 1}
+@pytest.mark.parametrize('older', [0, 1])
+def test_a_joint_older_than_what_is_held_of_it_is_a_step_back(robot, older):
+    for nanosec in (10, 10 - older):
+        ready = robot.input.feed(Message(5, nanosec, robot.left, (0.1,) * 6).cdr())
+    assert len(ready) == 1
+    assert robot.input.counts == ({'time_jump': 1} if older else {})
+
+
+@pytest.mark.parametrize('older', [0, 1])
+def test_a_message_older_than_anything_held_by_more_than_the_timeout_is_a_step_back(robot, older):
+    robot.input.feed(Message(5, 0, robot.left, (0.1,) * 6).cdr())
+    assert robot.input.feed(Message(4, 500_000_000 - older, robot.right, (0.1,) * 6).cdr())
+    assert robot.input.counts == ({'time_jump': 1} if older else {})
+    assert bool(robot.input.known_joints(LEFT)) is not bool(older)
 
 
 def test_strangers_messages_do_not_move_time(robot):
