@@ -289,6 +289,14 @@ def test_degrees_for_radians_are_noted(robot):
     assert robot.input.take_counts(LEFT).ready == 2
 
 
-def test_the_names_that_came_last_are_known(robot):
+def test_the_names_that_came_are_known_of_every_publisher(robot):
     robot.send(0, ['L_KNEE', 'icub/l_knee'])
-    assert robot.input.names == ('L_KNEE', 'icub/l_knee')
+    robot.send(1, ['wheel'], [])
+    robot.send(2, ['L_KNEE', 'icub/l_knee'])
+    robot.input.feed(b'')
+    assert set(robot.input.names_since()) == {'L_KNEE', 'icub/l_knee', 'wheel'}
+    assert set(robot.input.names_since(2)) == {'L_KNEE', 'icub/l_knee'}
+    assert robot.input.names_since(3) == ()
+    long = ('x' * 100_000, 'l_knee')
+    robot.send(3, long)
+    assert robot.input.names_since(4) == long

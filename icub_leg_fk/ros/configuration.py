@@ -22,6 +22,7 @@ class Configuration:
     Attributes:
         chains: the chains to publish, in the foot frame asked for.
         notes: what a user should know of this choice, one line each.
+        warnings: what is doubtful in the kinematics file, one line each.
         frame_prefix: put before every frame id.
         joint_timeout: greatest age of a joint beside the newest of its chain [s]; 0 is none.
         stamp_now: whether poses are stamped with the node's time instead of the message's.
@@ -32,6 +33,7 @@ class Configuration:
 
     chains: tuple[Chain, ...]
     notes: tuple[str, ...]
+    warnings: tuple[str, ...]
     frame_prefix: str
     joint_timeout: float
     stamp_now: bool
@@ -79,6 +81,7 @@ class Configuration:
             notes=tuple(f'{chain.name} has no {values["foot_frame"]} frame; its pose is that of '
                         f'{prefix}{chain.tip_frame}' for chain in chains if values['foot_frame']
                         not in _tip_frames(catalog, chain.name, chain.version)),
+            warnings=catalog.warnings,
             frame_prefix=prefix,
             joint_timeout=timeout,
             stamp_now=values['stamp_source'] == 'now',

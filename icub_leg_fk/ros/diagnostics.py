@@ -1,4 +1,4 @@
-"""What the node says of itself once a second: a status per chain, and signs of life in the log."""
+"""What the node says of itself once a second: a status per chain; the signs of life beside it."""
 
 from __future__ import annotations
 
@@ -26,15 +26,16 @@ class Diagnostics:
     Args:
         node: the node to speak for.
         topic: full name of the topic the joint states come from.
+        signs: logs what is worth it of each second.
         state: returns the joint input and when it last got a message [s, monotonic] or None.
     """
 
-    def __init__(self, node: Node, topic: str,
+    def __init__(self, node: Node, topic: str, signs: SignsOfLife,
                  state: Callable[[], tuple[JointInput, float | None]]) -> None:
         self._node = node
         self._topic = topic
         self._state = state
-        self._signs = SignsOfLife(node.get_logger(), topic)
+        self._signs = signs
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self._timer = node.create_timer(_PERIOD, self._publish,
                                         clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -56,7 +57,7 @@ class Diagnostics:
             rejected=rejected,
             chains=[(chain, joint_input.take_counts(index))
                     for index, chain in enumerate(joint_input.chains)],
-            names=joint_input.names,
+            names=joint_input.names_since(self._messages),
             types=[info.topic_type
                    for info in self._node.get_publishers_info_by_topic(self._topic)])
         self._messages, self._rejected = joint_input.messages, Counter(joint_input.counts)
@@ -98,8 +99,8 @@ def _verdict(second: Second, counts: ChainCounts, missing: list[str]) -> tuple[b
     if second.messages == 0:
         before = f', {second.messages_before} before' if second.messages_before else ''
         return DiagnosticStatus.STALE, (
-            f'no JointState received: none for {second.silence:.1f} s{before}'
-            f'{second.foreign_types()}')
+            f'no JointState received: none for {second.silence:.1f} s{before}; '
+            f'{second.publishers()}')
     concerns = [f'{_WORDS[reason]}: {_listed(joints)}'
                 for reason, joints in sorted(counts.joints.items())]
     # An empty position is counted only, unless nothing else comes.

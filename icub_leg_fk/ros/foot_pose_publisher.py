@@ -10,6 +10,7 @@ from icub_leg_fk.ros.joint_input import JointInput
 from icub_leg_fk.ros.outputs import Outputs
 from icub_leg_fk.ros.parameters import NodeParameters
 from icub_leg_fk.ros.qos_overrides import OVERRIDABLE
+from icub_leg_fk.ros.signs_of_life import SignsOfLife
 from icub_leg_fk.ros.throttle import ThrottledWarnings
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.node import Node
@@ -31,16 +32,17 @@ class FootPosePublisher(Node):
     def __init__(self) -> None:
         super().__init__(NODE_NAME)
         parameters = NodeParameters(self, self._configure)
+        topic = self.resolve_topic_name('joint_states')
+        self._signs = SignsOfLife(self.get_logger(), topic)
         self._warnings = ThrottledWarnings(lambda text: self.get_logger().warning(text))
         self._input = JointInput((), 0.0, lambda: 0)
         self._heard: float | None = None
-        self._said = ''
         self._outputs = Outputs(self, lambda chain: self._input.note_no_velocity(chain))
         self._joint_states = self.create_subscription(
             JointState, 'joint_states', self._take, qos_profile_sensor_data, raw=True,
             qos_overriding_options=OVERRIDABLE)
         self._configure(parameters.configuration)
-        self._diagnostics = Diagnostics(self, self._joint_states.topic_name,
+        self._diagnostics = Diagnostics(self, topic, self._signs,
                                         lambda: (self._input, self._heard))
 
     def _take(self, data: bytes) -> None:
@@ -56,13 +58,19 @@ class FootPosePublisher(Node):
         joint_input.take_over(self._input)
         self._input = joint_input
         self._outputs.configure(configuration)
-        publishing = ', '.join(
-            f'{chain.tip} ({chain.name} {chain.version}, {configuration.frame_prefix}'
-            f'{chain.root_frame} to {configuration.frame_prefix}{chain.tip_frame})'
-            for chain in configuration.chains)
-        said = f'listening to {self._joint_states.topic_name}, publishing {publishing}'
-        if said != self._said:
-            self._said = said
-            for note in configuration.notes:
-                self.get_logger().info(note)
-            self.get_logger().info(said)
+        self._signs.configured([
+            *configuration.notes,
+            f'publishing {_published(configuration)}; joint states from '
+            f'{self._joint_states.topic_name}'], configuration.warnings)
+
+
+def _published(configuration: Configuration) -> str:
+    """Say what is published in a line."""
+    prefix = configuration.frame_prefix
+    kinds = ['poses', *(kind for kind, wanted in (
+        ('twists', configuration.publish_twist), ('transforms', configuration.publish_tf),
+        ('skeletons', configuration.publish_markers)) if wanted)]
+    chains = ', '.join(
+        f'{chain.tip} ({chain.name} {chain.version}, {prefix}{chain.root_frame} to '
+        f'{prefix}{chain.tip_frame})' for chain in configuration.chains)
+    return f'{", ".join(kinds)} of {chains}'

@@ -108,6 +108,7 @@ class _Layout:
 
     def __init__(self, data: bytes, head: JointStateHead, joints: _Joints) -> None:
         self.names = head.names
+        self.last_message = 0  # number of the last message that had it
         self.duplicate = next((name for name, count in Counter(head.names).items() if count > 1),
                               None)
         self.end = head.end
@@ -166,7 +167,6 @@ class JointInput:
         counts: messages by reason of `MESSAGE_REASONS`.
         chain_counts: one `ChainCounts` per chain.
         newest: newest stamp held [ns], or None while nothing is.
-        names: joint names of the last message that could be read.
     """
 
     def __init__(self, chains: Sequence[Chain], joint_timeout: float, now: Callable[[], int],
@@ -176,7 +176,6 @@ class JointInput:
         self.counts: Counter[str] = Counter()
         self.chain_counts = [ChainCounts() for _ in self.chains]
         self.newest: int | None = None
-        self.names: tuple[str, ...] = ()
         self._now = now
         self._report = report
         self._timeout_ns = round(joint_timeout * 1e9)
@@ -185,6 +184,7 @@ class JointInput:
                          for lower, upper in zip(chain.lower.tolist(), chain.upper.tolist())]
                         for chain in self.chains]
         self._layouts: list[_Layout] = []
+        self._latest: _Layout | None = None
 
     def feed(self, data: bytes) -> list[Ready]:
         """Take one serialized JointState in and return the joint vectors it makes ready."""
@@ -196,7 +196,8 @@ class JointInput:
         except MalformedMessageError as error:
             self._reject('malformed', f'{error}; message ignored')
             return []
-        self.names = layout.names
+        self._latest = layout
+        layout.last_message = self.messages
         if positions is None or not layout.slots:
             return []
         if sec == 0 and nanosec == 0:
@@ -255,8 +256,7 @@ class JointInput:
 
     def take_over(self, previous: JointInput) -> None:
         """Go on with the joints and the counts of an input that this one replaces."""
-        self.messages, self.counts, self.names = (previous.messages, previous.counts,
-                                                  previous.names)
+        self.messages, self.counts = previous.messages, previous.counts
         counts = {chain.name: previous.take_counts(index)
                   for index, chain in enumerate(previous.chains)}
         self.chain_counts = [counts.get(chain.name, ChainCounts()) for chain in self.chains]
@@ -273,6 +273,12 @@ class JointInput:
         return {name: stamp for name, slot in zip(
             self.chains[chain].joint_names, self._joints.of_chain[chain])
             if (stamp := self._joints.stamps[slot]) is not None}
+
+    def names_since(self, message: int = 0) -> tuple[str, ...]:
+        """Return the joint names that came after so many messages, as far as is remembered."""
+        layouts = [*self._layouts, *([self._latest] if self._latest else [])]
+        return tuple(dict.fromkeys(name for layout in layouts if layout.last_message > message
+                                   for name in layout.names))
 
     def _layout(self, data: bytes) -> _Layout:
         """Return what the names of a message mean, remembered or read anew."""

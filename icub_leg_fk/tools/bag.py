@@ -174,7 +174,6 @@ class _Job:
         self._joint_ids = {connection.id for connection in joint_connections}
         self._time = 0
         self._first = self._last = 0
-        self._names: tuple[str, ...] = ()
         self._was_held_back: list[Counter[str]] = []
         self._input = JointInput(configuration.chains, configuration.joint_timeout,
                                  lambda: self._time)
@@ -217,8 +216,6 @@ class _Job:
                 for topic, message in self._messages(vectors):
                     write(added[topic], timestamp, message)
                     self._added[topic] += 1
-                if self._input.names:
-                    self._names = self._input.names
             if progress is not None and number % 1000 == 0:
                 progress(number / total)
 
@@ -232,8 +229,9 @@ class _Job:
                            for chain in self._configuration.chains)
         if not self._input.messages:
             raise InputFileError(f'{self._source}: no message of joint states; {wanted}')
-        shown = ', '.join(self._names[:_NAMES_SHOWN]) or 'none'
-        more = len(self._names) - _NAMES_SHOWN
+        names = self._input.names_since()
+        shown = ', '.join(names[:_NAMES_SHOWN]) or 'none'
+        more = len(names) - _NAMES_SHOWN
         raise InputFileError(f'{self._source}: no message has a joint of any chain: {wanted}; '
                              f'names found: {shown}{f" and {more} more" if more > 0 else ""}')
 

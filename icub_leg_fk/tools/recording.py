@@ -125,7 +125,7 @@ def read_bag(path: Path, chains: Sequence[Chain], topic: str | None) -> Tracks:
             found.poseless.append(f'{chain.name} needs '
                                   f'{", ".join(missing) or "joint positions that are finite"}')
     if not found.tracks:
-        shown = ', '.join(joint_input.names[:20]) or 'none'
+        shown = ', '.join(joint_input.names_since()[:20]) or 'none'
         raise InputFileError(f'{path}: no pose in {joint_input.messages} joint states: '
                              f'{"; ".join(found.poseless)}; names found: {shown}')
     return found
