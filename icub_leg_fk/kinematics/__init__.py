@@ -8,8 +8,9 @@ from icub_leg_fk.kinematics.catalog import Catalog, config_file, load_chain
 from icub_leg_fk.kinematics.chain import Chain
 from icub_leg_fk.kinematics.link import DHLink
 from icub_leg_fk.kinematics.rotation import matrix_to_quaternion, quaternion_to_matrix
+from icub_leg_fk.kinematics.urdf import chain_from_urdf, Urdf
 
 __all__ = [
-    'Catalog', 'Chain', 'DHLink', 'config_file', 'load_chain', 'matrix_to_quaternion',
-    'quaternion_to_matrix',
+    'Catalog', 'Chain', 'DHLink', 'Urdf', 'chain_from_urdf', 'config_file', 'load_chain',
+    'matrix_to_quaternion', 'quaternion_to_matrix',
 ]

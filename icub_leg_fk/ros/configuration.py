@@ -11,6 +11,7 @@ from icub_leg_fk.errors import LegFKError, ParameterError
 from icub_leg_fk.kinematics import Catalog, Chain
 
 STAMP_SOURCES = ('message', 'now')
+DEFAULT_FRAME = 'dh'
 DEFAULT_TIMEOUT = 0.5  # s
 LONGEST_TIMEOUT = 1e6  # s
 
@@ -59,7 +60,8 @@ class Configuration:
                                  f'more of {", ".join(catalog.chains)}, each once')
         known = {frame: None for entry in catalog.chains.values()
                  for version in entry.versions.values() for frame in version.tip_frames}
-        _check_choice('foot_frame', values['foot_frame'], tuple(known))
+        if values['foot_frame'] != DEFAULT_FRAME:  # which stands for the first, too
+            _check_choice('foot_frame', values['foot_frame'], tuple(known))
         _check_choice('stamp_source', values['stamp_source'], STAMP_SOURCES)
         timeout, prefix = values['joint_timeout'], values['frame_prefix']
         if not 0.0 <= timeout <= LONGEST_TIMEOUT:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 import math
+import sys
 from typing import TYPE_CHECKING
 
 from icub_leg_fk.errors import JointVectorError, LegFKError
@@ -35,10 +36,16 @@ def add_chain(parser: argparse.ArgumentParser) -> None:
                         help='a chain of the kinematics file, such as left_leg (see leg_fk list)')
     parser.add_argument('--version', metavar='VERSION',
                         help='version of the chain (default: v2_5, if the chain has it)')
-    parser.add_argument('--foot-frame', metavar='{dh,sole}', default='dh',
-                        help="axes of the tip: the table's last frame (the default), or the sole "
-                             '(x forward, y left, z up)')
+    add_foot_frame(parser)
     add_kinematics_file(parser)
+
+
+def add_foot_frame(parser: argparse.ArgumentParser) -> None:
+    """Add `--foot-frame`."""
+    parser.add_argument('--foot-frame', metavar='FRAME',
+                        help="axes of the tip: of the iCub's feet dh, the table's last frame, or "
+                             "sole, x forward, y left, z up (default: the chain's first tip "
+                             'frame)')
 
 
 def add_chain_version(parser: argparse.ArgumentParser) -> None:
@@ -107,15 +114,27 @@ def chosen_version(catalog: Catalog, chain: str, version: str | None) -> str:
     return version or DEFAULT_VERSION
 
 
+def load_catalog(args: argparse.Namespace) -> Catalog:
+    """Return the catalog that `-k` names; what it warns of is said on stderr.
+
+    Raises:
+        CatalogError: the file is bad.
+    """
+    from icub_leg_fk.kinematics import Catalog
+
+    catalog = Catalog.load(args.kinematics_file)
+    for line in catalog.warnings:
+        print(f'leg_fk: warning: {line}', file=sys.stderr)
+    return catalog
+
+
 def load_chain(args: argparse.Namespace) -> tuple[Catalog, Chain]:
     """Return the catalog and the chain that the options of `add_chain` name.
 
     Raises:
         LegFKError: the file is bad, or a name is not in it.
     """
-    from icub_leg_fk.kinematics import Catalog
-
-    catalog = Catalog.load(args.kinematics_file)
+    catalog = load_catalog(args)
     version = chosen_version(catalog, args.chain, args.version)
     return catalog, catalog.chain(args.chain, version, args.foot_frame)
 

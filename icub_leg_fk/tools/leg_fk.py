@@ -25,6 +25,8 @@ MODULES = {
     'explain': 'explain',
     'bag': 'bag',
     'plot': 'plot',
+    'table': 'table',
+    'compare': 'compare',
     'urdf': 'urdf',
     'demo': 'demo',
 }
@@ -40,6 +42,8 @@ examples:
   leg_fk explain left_leg --version v2_5
   leg_fk bag walking.mcap walking_with_poses.mcap --version v2_5
   leg_fk plot walking.mcap -o feet.png
+  leg_fk compare my_robot.urdf
+  leg_fk table my_robot.urdf --root root_link --tips l_sole r_sole -o my_robot.yaml
   leg_fk urdf left_leg right_leg --version v2_5 -o legs.urdf
   leg_fk demo
 

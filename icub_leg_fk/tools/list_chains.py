@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any, TYPE_CHECKING
 
-from icub_leg_fk.tools.chain_arguments import add_json, add_kinematics_file
+from icub_leg_fk.tools.chain_arguments import add_json, add_kinematics_file, load_catalog
 
 if TYPE_CHECKING:
     from icub_leg_fk.kinematics.catalog import ChainEntry
@@ -26,10 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the chains."""
-    from icub_leg_fk.kinematics import Catalog
     from icub_leg_fk.tools.text import json_text
 
-    catalog = Catalog.load(args.kinematics_file)
+    catalog = load_catalog(args)
     if args.json:
         chains = [_as_json(entry) for entry in catalog.chains.values()]
         print(json_text({'file': catalog.file, 'chains': chains}))

@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING
 from icub_leg_fk.errors import InputFileError, LegFKError
 from icub_leg_fk.tools.chain_arguments import (
     add_chain_version,
+    add_foot_frame,
     add_kinematics_file,
     chosen_version,
+    load_catalog,
     own_versions,
 )
 
@@ -50,9 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--version', metavar='VERSION',
                         help='version of the chains (default: v2_5, if they have it)')
     add_chain_version(parser)
-    parser.add_argument('--foot-frame', metavar='{dh,sole}', default='dh',
-                        help="axes of the feet: the table's last frame (the default), or the sole "
-                             '(x forward, y left, z up)')
+    add_foot_frame(parser)
     parser.add_argument('--at', metavar='T[,T...]', type=_times,
                         help=f'up to {MAX_INSTANTS} times [s] at which to draw the legs (default: '
                              'where one foot is highest above the other, or farthest ahead)')
@@ -64,7 +64,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Draw the picture."""
-    from icub_leg_fk.kinematics import Catalog
     from icub_leg_fk.tools.drawing.pictures import feet_figure
     from icub_leg_fk.tools.drawing.style import check_output, save_picture
 
@@ -73,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.input.exists():
         raise InputFileError(f'{args.input}: there is no such file or directory; allowed: a bag '
                              'or a CSV file')
-    catalog = Catalog.load(args.kinematics_file)
+    catalog = load_catalog(args)
     chains = _chosen_chains(catalog, args)
     roots = {chain.root_frame for chain in chains}
     if len(roots) > 1:

@@ -11,6 +11,7 @@ from icub_leg_fk.tools.chain_arguments import (
     add_chain_version,
     add_kinematics_file,
     DEFAULT_VERSION,
+    load_catalog,
     own_versions,
 )
 
@@ -46,10 +47,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the URDF."""
-    from icub_leg_fk.kinematics import Catalog
     from icub_leg_fk.tools.urdf_model import urdf_text
 
-    catalog = Catalog.load(args.kinematics_file)
+    catalog = load_catalog(args)
     selections = _selections(catalog, args)
     robot = args.name or ('icub' if args.kinematics_file is None else Path(catalog.file).stem)
     if not robot.isprintable():

@@ -6,7 +6,7 @@ link, A_i at q = 0, becomes the fixed origin of the next joint. Every joint move
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 import math
 from typing import NamedTuple
@@ -60,10 +60,10 @@ def urdf_text(robot: str, selections: Sequence[Selection]) -> str:
     for name, rgba in COLOURS.items():
         ET.SubElement(ET.SubElement(root, 'material', name=name), 'color', rgba=rgba)
     base = ET.SubElement(root, 'link', name=root_frames.pop())
+    tree = _Tree(root)
     for selection in selections:
         _bone(base, selection.table.T_root_0[:3, 3])
-        for element in _chain(selection):
-            root.append(element)
+        tree.add(selection)
     for kind in ('link', 'joint'):
         _refuse_shared_names(root, kind)
     ET.indent(root)
@@ -84,33 +84,60 @@ def xyz_rpy(T: Array) -> tuple[Array, Array]:
     return T[:3, 3], np.array([roll, pitch, yaw])
 
 
-def _chain(selection: Selection) -> Iterator[ET.Element]:
-    entry, table = selection.entry, selection.table
-    origin, parent = table.T_root_0, table.root_frame
-    names = iter(table.joint_names)
-    for link in table.links:
-        if link.is_fixed:
-            origin = origin @ link.transform()
-            continue
-        name = next(names)
-        yield _joint(entry.name, name, link, origin, parent)
-        origin, parent = link.transform(), f'{name}_link'
-        element = ET.Element('link', name=parent)
-        _ball(element, 'joint', JOINT_RADIUS)
-        _bone(element, origin[:3, 3])
-        yield element
-    dh, sole = table.tip_frames['dh'], table.tip_frames.get('sole')
-    yield _fixed(f'{dh.frame}_joint', origin @ table.T_n_tip, parent, dh.frame)
-    tip = ET.Element('link', name=dh.frame)
-    yield tip
-    if sole is None:
-        _ball(tip, 'tip', TIP_RADIUS)
-        return
-    yield _fixed(f'{sole.frame}_joint', sole.T_dh_tip, dh.frame, sole.frame)
-    foot = ET.Element('link', name=sole.frame)
-    box = _visual(foot, 'tip', np.array(SOLE_CENTRE))
-    ET.SubElement(box, 'box', size=SOLE_SIZE)
-    yield foot
+class _Tree:
+    """The links and joints of a URDF; a joint of several chains is there once."""
+
+    def __init__(self, root: ET.Element) -> None:
+        self._root = root
+        self._joints: dict[str, tuple[str, DHLink, Array]] = {}
+
+    def add(self, selection: Selection) -> None:
+        """Add a chain.
+
+        Raises:
+            LegFKError: it has a joint that is elsewhere in another chain.
+        """
+        entry, table = selection.entry, selection.table
+        origin, parent = table.T_root_0, table.root_frame
+        names = iter(table.joint_names)
+        for link in table.links:
+            if link.is_fixed:
+                origin = origin @ link.transform()
+                continue
+            name = next(names)
+            if name in self._joints:
+                origin = self._shared(entry.name, name, link, origin, parent) @ link.transform()
+            else:
+                self._joints[name] = parent, link, origin
+                self._root.append(_joint(entry.name, name, link, origin, parent))
+                element = ET.SubElement(self._root, 'link', name=f'{name}_link')
+                _ball(element, 'joint', JOINT_RADIUS)
+                origin = link.transform()
+                _bone(element, origin[:3, 3])
+            parent = f'{name}_link'
+        for name, frame in table.tip_frames.items():
+            self._root.append(_fixed(f'{frame.frame}_joint',
+                                     origin @ table.T_n_tip @ frame.T_dh_tip, parent, frame.frame))
+            tip = ET.SubElement(self._root, 'link', name=frame.frame)
+            if name == 'sole':
+                ET.SubElement(_visual(tip, 'tip', np.array(SOLE_CENTRE)), 'box', size=SOLE_SIZE)
+            elif 'sole' not in table.tip_frames:
+                _ball(tip, 'tip', TIP_RADIUS)
+
+    def _shared(self, chain: str, name: str, link: DHLink, origin: Array, parent: str) -> Array:
+        """Return where a chain's frame is in the link of a joint that is there already.
+
+        It may be elsewhere along and about the joint's axis, which makes no difference to it.
+        """
+        before, other, place = self._joints[name]
+        T = np.linalg.inv(place) @ origin
+        same = (before == parent and np.allclose(T[:3, 2], (0, 0, 1), rtol=0, atol=1e-9)
+                and (link.is_prismatic or np.allclose(T[:2, 3], 0, rtol=0, atol=1e-9))
+                and (link.joint_type, link.sign) == (other.joint_type, other.sign))
+        if not same:
+            raise LegFKError(f'joint {name!r} of chain {chain} is elsewhere in another chain; '
+                             'choose chains that agree on the joints they share')
+        return np.asarray(T)
 
 
 def _joint(chain: str, name: str, link: DHLink, origin: Array, parent: str) -> ET.Element:
@@ -121,7 +148,7 @@ def _joint(chain: str, name: str, link: DHLink, origin: Array, parent: str) -> E
     kind = link.joint_type if documented else 'continuous'
     joint = ET.Element('joint', name=name, type=kind)
     _place(joint, origin, parent, f'{name}_link')
-    ET.SubElement(joint, 'axis', xyz='0 0 1')
+    ET.SubElement(joint, 'axis', xyz=f'0 0 {link.sign}')
     if link.erratum:
         _comment(joint, f'Erratum of the printed table: {link.erratum}')
     if documented:

@@ -132,7 +132,7 @@ class Decimals:
         return products
 
 
-def explanation(entry: ChainEntry, chain: Chain, foot_frame: str, q: Sequence[float] | None,
+def explanation(entry: ChainEntry, chain: Chain, foot_frame: str | None, q: Sequence[float] | None,
                 algebra: Algebra) -> Explanation:
     """Work a chain out, step by step.
 
@@ -149,9 +149,9 @@ def explanation(entry: ChainEntry, chain: Chain, foot_frame: str, q: Sequence[fl
     tips = []
     if not np.array_equal(version.T_n_tip, np.eye(4)):
         tips.append((f'T_n{tip}', algebra.matrix(version.T_n_tip)))
-    if foot_frame != 'dh':
-        tips.append((f'T_{tip}{sole}',
-                     algebra.matrix(version.tip_frames[foot_frame].T_dh_tip)))
+    T_dh_tip = version.tip_frames[foot_frame or next(iter(version.tip_frames))].T_dh_tip
+    if not np.array_equal(T_dh_tip, np.eye(4)):
+        tips.append((f'T_{tip}{sole}', algebra.matrix(T_dh_tip)))
         tip = sole
     T_root_0 = algebra.matrix(chain.T_root_0)
     T_root_tip = product(T_root_0, steps[-1].T_0)
