@@ -18,6 +18,7 @@ CASES = [
     (None, 'head_imu', 'v2', 'dh'),
     (EXAMPLES / 'cylindrical_arm.yaml', 'arm', 'v1', 'dh'),
     (EXAMPLES / 'ur5.yaml', 'ur5', 'series_3', 'dh'),
+    (EXAMPLES / 'panda.yaml', 'panda', 'fci', 'flange'),
     (HERE / 'odd_arm.yaml', 'odd_arm', 'v1', 'dh'),
     (HERE / 'odd_arm.yaml', 'odd_arm', 'v1', 'sole'),
 ]

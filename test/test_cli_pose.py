@@ -76,7 +76,7 @@ def test_a_slide_is_metres_beside_degrees_and_radians():
     assert pose(*ARM, '--degrees', 30, 0.2, 0.1)['position'] == pytest.approx(expected)
     assert pose(*ARM, '--radians', math.pi / 6, 0.2, 0.1)['position'] == pytest.approx(expected)
     text = leg_fk('pose', *ARM, '--degrees', 30, 0.2, 0.1).stdout
-    assert 'lift     0.2  m    documented 0 .. 0.5 m' in text
+    assert 'lift     0.2  m    range 0 .. 0.5 m' in text
 
 
 def test_a_ur5_stands_where_its_makers_table_puts_it():
@@ -101,7 +101,7 @@ def test_a_joint_outside_its_range_is_noted_and_not_clamped():
     done = leg_fk('pose', 'left_leg', '--version', 'v1', '--degrees', 0, 30, 0, 0, 0, 0)
     assert done.returncode == 0
     note = ' '.join(done.stdout[done.stdout.index('note:'):].split())
-    assert 'l_hip_roll = 30 deg is outside its documented range -119 .. 17 deg' in note
+    assert 'l_hip_roll = 30 deg is outside its range -119 .. 17 deg' in note
     assert 'sign slip' in note and 'never clamped' in note
     clamped = pose('left_leg', '--degrees', 0, 17, 0, 0, 0, 0)['position']
     moved = math.dist(pose('left_leg', '--degrees', 0, 30, 0, 0, 0, 0)['position'], clamped)

@@ -33,7 +33,10 @@ def test_each_step_follows_from_the_one_before(words, chain):
     e = json.loads(explain(*words, '--json', '--radians', *positions(chain, 2)))
     T_0 = np.eye(4)
     for link, product in zip(e['links'], e['running_products'], strict=True):
-        factors = [np.array(link['factors'][name]) for name in ('Rz', 'tz', 'tx', 'Rx')]
+        order = ['Rx', 'tx', 'Rz', 'tz'] if chain.convention == 'modified' else [
+            'Rz', 'tz', 'tx', 'Rx']
+        assert list(link['factors']) == order
+        factors = [np.array(factor) for factor in link['factors'].values()]
         assert np.allclose(np.linalg.multi_dot(factors), link['A'], rtol=0, atol=1e-10)
         T_0 = T_0 @ link['A']
         assert np.allclose(T_0, product, rtol=0, atol=1e-10)
@@ -46,14 +49,19 @@ def test_each_step_follows_from_the_one_before(words, chain):
 @every_chain
 def test_the_frames_obey_the_first_four_steps_of_the_method(words, chain):
     e = json.loads(explain(*words, '--json', '--radians', *positions(chain, 3)))
-    for before, own in zip(e['frames'], e['frames'][1:], strict=False):
-        assert abs(np.dot(own['x'], before['z'])) < 1e-12
+    n = len(e['links']) + 1
+    assert e['frame_names'][:n] == [str(i) for i in range(n)]
+    assert len(e['frames']) == n + len(e['after_last_link'])
+    frames = e['frames'][:n]
+    for own, other in zip(frames[1:], frames, strict=False):
+        if chain.convention == 'modified':  # where x_i is orthogonal to the axis behind it
+            own, other = other, own
+        assert abs(np.dot(own['x'], other['z'])) < 1e-12
         assert abs(np.dot(own['x'], own['z'])) < 1e-12
         assert np.allclose(np.cross(own['z'], own['x']), own['y'], atol=1e-12)
-        # x points along the common normal, so that from z_(i-1) it meets the origin of frame i.
-        reach = np.subtract(own['origin'], before['origin'])
-        assert abs(np.dot(np.cross(before['z'], own['x']), reach)) < 1e-9
-    assert len(e['frames']) == len(e['links']) + 1
+        # x points along the common normal, so that from the other axis it meets the origin.
+        reach = np.subtract(own['origin'], other['origin'])
+        assert abs(np.dot(np.cross(other['z'], own['x']), reach)) < 1e-9
 
 
 @pytest.mark.parametrize(('words', 'position'), [
@@ -140,3 +148,25 @@ def test_the_steps_are_walked_in_order():
 ])
 def test_a_mistake_is_one_line_and_exit_2(words, complaint):
     assert_one_line_complaint(leg_fk('explain', *words), complaint)
+
+
+def test_joints_outside_their_range_are_said_as_in_pose():
+    text = explain('left_leg', '--degrees', 0, -30, 0, 0, 0, 0)
+    note = ' '.join(text[text.index('note:'):].split())
+    assert note.startswith('note: l_hip_roll = -30 deg is outside its range -20 .. 120 deg')
+    assert 'never clamped' in note
+    assert 'never clamped' in explain('left_leg', '--latex', '--degrees', 0, -30, 0, 0, 0, 0)
+    assert 'note:' not in explain('left_leg', '--degrees', 0, 30, 0, 0, 0, 0)
+
+
+def test_the_head_sensors_transform_is_told_as_the_fixed_row_of_its_document():
+    text = ' '.join(explain('head_imu', '--version', 'v2', '--degrees', *[0] * 6).split())
+    assert ('T_nIs is what a last fixed row would be, whose joint stays at 0: a = 0, d = 6.6, '
+            'alpha = pi/2, theta = 0') in text
+    assert 'z_Is = ( 0 0 1) as T_nIs has it' in text
+
+
+def test_latex_ends_with_the_sentence_that_the_text_ends_with():
+    words = ['left_leg', '--degrees', 0, 10, 0, -30, -15, 5]
+    sentence = explain(*words).splitlines()[-1]
+    assert sentence.replace('_', r'\_') in explain(*words, '--latex')

@@ -62,15 +62,15 @@ def _as_text(chain: Chain, q: list[float], T: Array, quaternion: Array) -> list[
         indented,
         matrix,
         position_text,
+        range_notes,
         range_text,
-        wrapped,
     )
 
     outside = chain.out_of_range(q)
     joints = list(zip(chain.joint_names, chain.joints, q, strict=True))
     table = columns([
         [name, *position_text(link, value).split(),
-         f'documented {range_text(link)}' if range_text(link) else '',
+         f'range {range_text(link)}' if range_text(link) else '',
          '<- outside' if name in outside else '']
         for name, link, value in joints])
     lines = [f'{chain.name} {chain.version}: {chain.tip_frame} in {chain.root_frame}', '']
@@ -82,10 +82,6 @@ def _as_text(chain: Chain, q: list[float], T: Array, quaternion: Array) -> list[
     lines += ['', *columns([['position (m)', 'x', values[0], 'y', values[1], 'z', values[2]]]),
               *columns([['quaternion  ', *(word for pair in zip('xyzw', values[3:], strict=True)
                                            for word in pair)]])]
-    for name, link, value in joints:
-        if name in outside:
-            erratum = f' (known erratum: {link.erratum})' if link.erratum else ''
-            lines += ['', *wrapped(
-                f'note: {name} = {position_text(link, value)} is outside its documented range '
-                f'{range_text(link)}{erratum}; computed as given, never clamped')]
+    for note in range_notes(chain, q):
+        lines += ['', *note.splitlines()]
     return lines

@@ -9,7 +9,7 @@ import textwrap
 from typing import Any
 
 from icub_leg_fk.errors import LegFKError
-from icub_leg_fk.kinematics.link import DHLink
+from icub_leg_fk.kinematics import Chain, DHLink
 
 WIDTH = 98
 
@@ -33,16 +33,30 @@ def position_text(link: DHLink, position: float) -> str:
 
 
 def range_text(link: DHLink) -> str:
-    """Return the documented range as `-44 .. 132 deg`; nothing if there is none."""
-    if link.lower == -math.inf and link.upper == math.inf:
+    """Return the range that counts as `-44 .. 132 deg`; nothing if there is none."""
+    low, high = link.limits
+    if low == -math.inf and high == math.inf:
         return ''
-    lower, _ = position_in(link, link.lower)
-    return f'{short(lower)} .. {position_text(link, link.upper)}'
+    lower, _ = position_in(link, low)
+    return f'{short(lower)} .. {position_text(link, high)}'
 
 
 def position_in(link: DHLink, position: float) -> tuple[float, int]:
     """Return a joint position in degrees, or metres if prismatic, and its useful decimals."""
     return (position, 6) if link.is_prismatic else (math.degrees(position), 4)
+
+
+def range_notes(chain: Chain, q: Sequence[float]) -> list[str]:
+    """Return a note for each joint that is outside its range."""
+    outside = chain.out_of_range(q)
+    notes = []
+    for name, link, value in zip(chain.joint_names, chain.joints, q, strict=True):
+        if name in outside:
+            erratum = f' (known erratum of the table: {link.erratum})' if link.erratum else ''
+            notes.append('\n'.join(wrapped(
+                f'note: {name} = {position_text(link, value)} is outside its range '
+                f'{range_text(link)}{erratum}; computed as given, never clamped')))
+    return notes
 
 
 def columns(rows: Rows, gap: str = '  ', header: Sequence[str] = ()) -> list[str]:

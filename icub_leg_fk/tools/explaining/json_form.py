@@ -19,14 +19,16 @@ def explanation_json(e: Explanation) -> str:
         'root_frame': chain.root_frame,
         'tip_frame': chain.tip_frame,
         'units': {'length': 'mm', 'angle': 'rad'},
+        'convention': chain.convention,
         'joints': list(chain.joint_names),
         'joint_positions': None if e.q is None else [
             1000 * value if link.is_prismatic else value
             for value, link in zip(e.q, chain.joints, strict=True)],
         'symbols': {name: str(meaning) for name, meaning in e.symbols.items()},
         'frames': [{'origin': T[:3, 3].tolist(), 'x': T[:3, 0].tolist(), 'y': T[:3, 1].tolist(),
-                    'z': T[:3, 2].tolist()} for T in e.frames + 0.0],
-        'links': [_link(step) for step in e.steps],
+                    'z': T[:3, 2].tolist()} for T in (frame + 0.0 for frame in e.frames.values())],
+        'frame_names': list(e.frames),
+        'links': [_link(step, chain.convention) for step in e.steps],
         'running_products': [_matrix(step.T_0) for step in e.steps],
         'T_root_0': _matrix(e.T_root_0),
         'after_last_link': {name: _matrix(T) for name, T in e.tips},
@@ -34,26 +36,31 @@ def explanation_json(e: Explanation) -> str:
     })
 
 
-def _link(step: Step) -> dict[str, Any]:
+def _link(step: Step, convention: str) -> dict[str, Any]:
+    names = (('Rx', 'tx', 'Rz', 'tz') if convention == 'modified'
+             else ('Rz', 'tz', 'tx', 'Rx'))
     link = step.row.link
     scale = 1000 if link.is_prismatic else 1
-    documented = math.isfinite(link.lower)
+    lower, upper = link.limits
     return {
         'i': step.row.index,
         'joint': step.row.joint or None,
         'joint_type': link.joint_type if step.row.joint else 'fixed',
-        'range': [scale * link.lower, scale * link.upper] if documented else None,
+        'range': [scale * lower, scale * upper] if math.isfinite(lower) else None,
         'erratum': link.erratum,
         'theta': _cell(step.theta), 'd': _cell(step.d), 'a': _cell(step.a),
         'alpha': _cell(step.alpha),
         'factors': {name: _matrix(factor) for name, factor
-                    in zip(('Rz', 'tz', 'tx', 'Rx'), step.factors, strict=True)},
+                    in zip(names, step.factors, strict=True)},
         'A': _matrix(step.A),
     }
 
 
-def _matrix(T: Matrix) -> list[list[float | str]]:
-    return [[_cell(cell) for cell in row] for row in T]
+def _matrix(T: Matrix) -> list[list[float]] | list[list[str]]:
+    """Return a matrix of numbers, or one of expressions if any entry is one."""
+    if all(isinstance(cell, (int, float)) for row in T for cell in row):
+        return [[float(cell) + 0.0 for cell in row] for row in T]
+    return [[str(cell) for cell in row] for row in T]
 
 
 def _cell(cell: Cell) -> float | str:

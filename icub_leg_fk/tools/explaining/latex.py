@@ -7,10 +7,12 @@ import re
 from icub_leg_fk.tools.explaining.steps import Explanation, Matrix, Step
 from icub_leg_fk.tools.explaining.terms import cell_words, filled, LATEX, symbol_latex, terms
 from icub_leg_fk.tools.explaining.text import (
+    closing_sentence,
     COLUMN_NAMES,
     defined_symbols,
     link_values,
     origin_reason,
+    out_of_range_notes,
     table_rows,
 )
 from icub_leg_fk.tools.text import position_text, short
@@ -37,6 +39,14 @@ GENERAL = r"""\[ A_i = T_{i(i+1)} = R_z(\theta_i)\, t_z(d_i)\, t_x(a_i)\, R_x(\a
 0 & 0 & 0 & 1
 \end{bmatrix} \]"""
 
+CRAIGS = r"""\[ A_i = T_{i(i+1)} = R_x(\alpha_i)\, t_x(a_i)\, R_z(\theta_i)\, t_z(d_i)
+= \begin{bmatrix}
+\cos\theta_i & -\sin\theta_i & 0 & a_i \\
+\sin\theta_i\cos\alpha_i & \cos\theta_i\cos\alpha_i & -\sin\alpha_i & -d_i\sin\alpha_i \\
+\sin\theta_i\sin\alpha_i & \cos\theta_i\sin\alpha_i & \cos\alpha_i & d_i\cos\alpha_i \\
+0 & 0 & 0 & 1
+\end{bmatrix} \]"""
+
 FRAMES = r"""The joint of row $i$ turns about, or slides along, $z_i$. The origin $o_i$ is where
 $z_i$ meets $z_{i-1}$, or where their common normal ends; $x_i$ is orthogonal to both axes;
 $y_i = z_i \times x_i$."""
@@ -45,7 +55,8 @@ $y_i = z_i \times x_i$."""
 def explanation_latex(e: Explanation) -> str:
     """Return a document that explains the chain."""
     parts = [PREAMBLE, _heading(e), r'\subsection*{Steps 1 to 4: the frames}', FRAMES, _frames(e),
-             r'\subsection*{Step 5: the Denavit-Hartenberg table}', _table(e), GENERAL]
+             r'\subsection*{Step 5: the Denavit-Hartenberg table}', _table(e),
+             CRAIGS if e.chain.convention == 'modified' else GENERAL]
     parts += [_symbols(e)] if e.symbols else []
     parts += [_link(e, step) for step in e.steps]
     parts += [r'\subsection*{Step 6: multiply}', _equation('T_{01} = A_{0}', e.steps[0].T_0)]
@@ -54,8 +65,9 @@ def explanation_latex(e: Explanation) -> str:
     parts += [_equation(f'T_{{{e.root}0}}', e.T_root_0)]
     parts += [_equation(_indexed(name), T) for name, T in e.tips]
     factors = [f'T_{{{e.root}0}}', f'T_{{0{len(e.steps)}}}', *(_indexed(n) for n, _ in e.tips)]
-    parts += [_equation(f'T_{{{e.root}{e.tip}}} = {" ".join(factors)}', e.T_root_tip),
-              r'\end{document}']
+    parts += [_equation(f'T_{{{e.root}{e.tip}}} = {" ".join(factors)}', e.T_root_tip)]
+    parts += [] if e.q is None else [_words(closing_sentence(e))]
+    parts += [*map(_words, out_of_range_notes(e)), r'\end{document}']
     return '\n\n'.join(parts)
 
 
@@ -76,10 +88,12 @@ def _heading(e: Explanation) -> str:
 
 def _frames(e: Explanation) -> str:
     rows = []
-    for i, T in enumerate(e.frames):
+    reasons = [origin_reason(e, i) for i in range(len(e.steps) + 1)]
+    reasons += [f'as {name} has it' for name, _ in e.tips]
+    for (i, T), reason in zip(e.frames.items(), reasons, strict=True):
         vectors = [f'$({", ".join(short(value) for value in T[:3, column])})$'
                    for column in (2, 3, 0, 1)]
-        rows.append(' & '.join([f'${i}$', *vectors, _formula_words(origin_reason(e, i))]) + r' \\')
+        rows.append(' & '.join([f'${i}$', *vectors, _formula_words(reason)]) + r' \\')
     where = _words(e.chain.root_frame)
     at = 'at $q = 0$' if e.q is None else 'at these positions'
     return '\n'.join([
@@ -114,7 +128,7 @@ def _link(e: Explanation, step: Step) -> str:
     values = r' \quad '.join(_formula(value) for value in link_values(e, step))
     factors = ' '.join(_matrix(factor) for factor in step.factors)
     return '\n'.join([
-        rf'\paragraph{{{_words(step.row.joint or "virtual link")}}} ${values}$',
+        rf'\paragraph{{{_words(step.row.joint or "fixed")}}} ${values}$',
         rf'\begin{{align*}} A_{{{i}}} = T_{{{i}{i + 1}}} &= {factors} \\',
         f'&= {_matrix(step.A)}', r'\end{align*}'])
 

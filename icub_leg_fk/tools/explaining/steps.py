@@ -1,7 +1,8 @@
 """What `leg_fk explain` tells: the Denavit-Hartenberg method, step by step, for one chain.
 
 Lengths are millimetres here, as in the printed tables. Rows count from i = 0, so row i is the
-transform A_i = T_i(i+1) = Rz(theta_i) tz(d_i) tx(a_i) Rx(alpha_i) from frame i+1 to frame i.
+transform A_i = T_i(i+1) = Rz(theta_i) tz(d_i) tx(a_i) Rx(alpha_i) from frame i+1 to frame i; in
+Craig's convention it is Rx(alpha_i) tx(a_i) Rz(theta_i) tz(d_i).
 An entry of a matrix is a float, or a sympy expression where the answer is to be exact.
 """
 
@@ -15,6 +16,7 @@ from typing import Any, Protocol
 
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.catalog import ChainEntry
+from icub_leg_fk.kinematics.chain import modified_rows
 from icub_leg_fk.kinematics.link import DHLink
 from icub_leg_fk.kinematics.rotation import Array, cos_sin
 import numpy as np
@@ -28,7 +30,7 @@ TIP_SYMBOLS = {'left_foot': ('Lf', 'Ls'), 'right_foot': ('Rf', 'Rs'), 'head_imu'
 
 @dataclass(frozen=True)
 class Row:
-    """A row of the DH table; `joint` is empty for the virtual link."""
+    """A row of the DH table; `joint` is empty for a fixed row."""
 
     index: int
     joint: str
@@ -63,7 +65,8 @@ class Explanation:
         tips: what follows the last row: name and matrix of T_nIs and of the sole.
         T_root_tip: the answer.
         symbols: what each symbol stands for; empty with numbers.
-        frames: (n + 1, 4, 4) frames 0 to n in the root frame [mm], for q or for q = 0.
+        frames: frames in the root frame [mm] by name, 0 to m and those of the tips, for q or for
+            q = 0.
     """
 
     chain: Chain
@@ -75,7 +78,7 @@ class Explanation:
     steps: list[Step]
     tips: list[tuple[str, Matrix]]
     T_root_tip: Matrix
-    frames: Array
+    frames: dict[str, Array]
     symbols: dict[str, Cell] = field(default_factory=dict)
 
 
@@ -96,8 +99,8 @@ class Algebra(Protocol):
     def cos_sin_constant(self, angle: Cell) -> tuple[Cell, Cell]:
         """Return cosine and sine of an angle that is no joint's."""
 
-    def running_products(self, steps: Sequence[Step]) -> list[Matrix]:
-        """Return T_01, T_02, ... T_0n."""
+    def running_products(self, steps: Sequence[Step], modified: bool) -> list[Matrix]:
+        """Return T_01, T_02, ... T_0m."""
 
 
 class Decimals:
@@ -114,7 +117,8 @@ class Decimals:
         """Return theta [rad], d, a [mm], alpha [rad] of a row."""
         link, position = row.link, q or 0.0
         slide, turn = (position, 0.0) if link.is_prismatic else (0.0, position)
-        return link.offset + turn, 1000 * (link.d + slide), 1000 * link.a, link.alpha
+        return (link.offset + link.sign * turn, 1000 * (link.d + link.sign * slide),
+                1000 * link.a, link.alpha)
 
     def cos_sin(self, row: Row, theta: Cell) -> tuple[Cell, Cell]:
         """Return cosine and sine of a row's theta."""
@@ -124,8 +128,8 @@ class Decimals:
         """Return cosine and sine of an angle."""
         return cos_sin(angle)
 
-    def running_products(self, steps: Sequence[Step]) -> list[Matrix]:
-        """Return T_01, T_02, ... T_0n."""
+    def running_products(self, steps: Sequence[Step], modified: bool) -> list[Matrix]:
+        """Return T_01, T_02, ... T_0m."""
         products = [steps[0].A]
         for step in steps[1:]:
             products.append(product(products[-1], step.A))
@@ -146,19 +150,21 @@ def explanation(entry: ChainEntry, chain: Chain, foot_frame: str | None, q: Sequ
     version = entry.versions[chain.version]
     steps = _steps(chain, q, algebra)
     tip, sole = TIP_SYMBOLS.get(chain.tip, ('E', 'S'))
-    tips = []
+    tip_transforms = []
     if not np.array_equal(version.T_n_tip, np.eye(4)):
-        tips.append((f'T_n{tip}', algebra.matrix(version.T_n_tip)))
+        tip_transforms.append((f'T_n{tip}', version.T_n_tip))
     T_dh_tip = version.tip_frames[foot_frame or next(iter(version.tip_frames))].T_dh_tip
     if not np.array_equal(T_dh_tip, np.eye(4)):
-        tips.append((f'T_{tip}{sole}', algebra.matrix(T_dh_tip)))
+        tip_transforms.append((f'T_{tip}{sole}', T_dh_tip))
         tip = sole
+    tips = [(name, algebra.matrix(T)) for name, T in tip_transforms]
     T_root_0 = algebra.matrix(chain.T_root_0)
     T_root_tip = product(T_root_0, steps[-1].T_0)
     for _, T in tips:
         T_root_tip = product(T_root_tip, T)
     return Explanation(chain, 'Ro', tip, version.source, q, T_root_0, steps, tips, T_root_tip,
-                       _frames(chain, q), algebra.symbols)
+                       _frames(chain, q, [(name, np.array(Decimals().matrix(T)))
+                                          for name, T in tip_transforms]), algebra.symbols)
 
 
 def number(cell: Cell, symbols: Mapping[str, Cell]) -> float | None:
@@ -191,7 +197,8 @@ def _steps(chain: Chain, q: Sequence[float] | None, algebra: Algebra) -> list[St
     names = iter(chain.joint_names)
     given: Iterator[float | None] = iter([None] * chain.n if q is None else q)
     rows, positions = [], []
-    for i, link in enumerate(chain.links):
+    modified = chain.convention == 'modified'
+    for i, link in enumerate(modified_rows(chain) if modified else chain.links):
         rows.append(Row(i, '' if link.is_fixed else next(names), link))
         positions.append(0.0 if link.is_fixed else next(given))
     steps = []
@@ -199,19 +206,26 @@ def _steps(chain: Chain, q: Sequence[float] | None, algebra: Algebra) -> list[St
         theta, d, a, alpha = algebra.values(row, position)
         factors = basic_transforms(algebra.cos_sin(row, theta), d, a,
                                    algebra.cos_sin_constant(alpha))
-        Rz, tz, tx, Rx = factors
-        A = product(product(Rz, tz), product(tx, Rx))
+        if modified:
+            factors = (factors[3], factors[2], factors[0], factors[1])
+        A = product(product(*factors[:2]), product(*factors[2:]))
         steps.append(Step(row, theta, d, a, alpha, factors, A, A))
-    products = algebra.running_products(steps)
+    products = algebra.running_products(steps, modified)
     return [Step(s.row, s.theta, s.d, s.a, s.alpha, s.factors, s.A, T)
             for s, T in zip(steps, products, strict=True)]
 
 
-def _frames(chain: Chain, q: Sequence[float] | None) -> Array:
-    """Return frames 0 to m in the root frame [mm]."""
-    frames = chain.frames([0.0] * chain.n if q is None else q)[:-1]
-    in_mm: Array = frames * (1, 1, 1, 1000)
-    return in_mm
+def _frames(chain: Chain, q: Sequence[float] | None, tips: Sequence[tuple[str, Array]]
+            ) -> dict[str, Array]:
+    """Return frames 0 to m and those of the tips in the root frame [mm], by name."""
+    algebra = Decimals()
+    T: Array = np.array(algebra.matrix(chain.T_root_0))
+    frames = {'0': T}
+    for step in _steps(chain, [0.0] * chain.n if q is None else q, algebra):
+        T = frames[str(step.row.index + 1)] = T @ np.array(step.A)
+    for name, placed in tips:
+        T = frames[name[3:]] = T @ placed
+    return frames
 
 
 def pi_text(angle: float) -> str:

@@ -5,7 +5,7 @@ sqrt(3)/2; the cosine of 100 degrees stays c_i, since its powers would fill page
 
 Every product is linear in each joint's c_i and s_i, so nothing needs simplifying, but for joints
 with parallel axes: Rz(theta_3) Rx(pi) Rz(theta_4) = Rz(theta_3 - theta_4) Rx(pi). Such angles are
-added up while multiplying, and appear as c_34 and s_34.
+added up while multiplying, and appear as c_34 and s_34, or c_3m4 and s_3m4 for a difference.
 """
 
 from __future__ import annotations
@@ -47,13 +47,15 @@ class Exact:
         a, alpha = exact_mm(link.a), exact_angle(link.alpha)
         if link.is_prismatic:
             if q is None:
-                d = self._define(f'd_{i}', sympy.Symbol(f'q_{i}') + d)
+                d = self._define(f'd_{i}', link.sign * sympy.Symbol(f'q_{i}') + d)
             else:
-                d += exact_mm(q)
+                d += link.sign * exact_mm(q)
+        elif link.is_fixed:
+            pass
         elif q is None:
-            theta = self._define(f'theta_{i}', sympy.Symbol(f'q_{i}') + theta)
+            theta = self._define(f'theta_{i}', link.sign * sympy.Symbol(f'q_{i}') + theta)
         else:
-            theta += exact_angle(q)
+            theta += link.sign * exact_angle(q)
         return theta, d, a, alpha
 
     def cos_sin(self, row: Row, theta: Cell) -> tuple[Cell, Cell]:
@@ -65,25 +67,35 @@ class Exact:
         """Return cosine and sine of an angle that is no joint's."""
         return sympy.cos(angle), sympy.sin(angle)
 
-    def running_products(self, steps: Sequence[Step]) -> list[Matrix]:
-        """Return T_01, T_02, ... T_0n, with the angles of joints on parallel axes added up."""
+    def running_products(self, steps: Sequence[Step], modified: bool) -> list[Matrix]:
+        """Return T_01, T_02, ... T_0m, with the angles of joints on parallel axes added up."""
         products: list[Matrix] = []
         base: Matrix | None = None
         turned: list[tuple[int, int]] = []  # joints since base, and the sense of each
         x, y, z, sense = 0, 0, 0, 1  # translation since base; -1 once the z axis points back
-        for step in steps:
-            turned.append((step.row.index, sense))
-            c, s = self._pair(turned)
-            x, y, z = x + c * step.a, y + s * step.a, z + sense * step.d
-            ca, sa = (sense * value for value in self.cos_sin_constant(step.alpha))
+
+        def behind(ca: Cell, sa: Cell) -> Matrix:
+            c, s = self._pair(turned) if turned else (sympy.Integer(1), sympy.Integer(0))
             within = [[c, -s * ca, s * sa, x], [s, c * ca, -c * sa, y],
                       [sympy.Integer(0), sa, ca, z], [0, 0, 0, 1]]
             T = within if base is None else product(base, within)
-            products.append(T)
-            if sa == 0:
-                sense = int(ca)
-            else:
-                base, turned, x, y, z, sense = products[-1], [], 0, 0, 0, 1
+            return [[sympy.expand(cell) for cell in row] for row in T]
+
+        for step in steps:
+            for part in ('link', 'joint') if modified else ('joint', 'link'):
+                if part == 'joint':
+                    turned.append((step.row.index, sense))
+                    z += sense * step.d
+                    continue
+                c, s = self._pair(turned) if turned else (1, 0)
+                x, y = x + c * step.a, y + s * step.a
+                ca, sa = (sense * value for value in self.cos_sin_constant(step.alpha))
+                if sa == 0:
+                    sense = int(ca)
+                else:
+                    base, turned, x, y, z, sense = behind(ca, sa), [], 0, 0, 0, 1
+            products.append(base if base is not None and not turned and not (x or y or z)
+                            and sense == 1 else behind(sympy.Integer(sense), sympy.Integer(0)))
         return products
 
     def _pair(self, turned: Sequence[tuple[int, int]]) -> tuple[Cell, Cell]:
@@ -97,7 +109,9 @@ class Exact:
         if not joints:  # cos(100 deg) is not simple; the angle itself may be a symbol's
             joints, constant, cc, sc = [index for index, _ in angles], 0, 1, 0
         total = sum(angle for index, angle in angles if index in joints)
-        name = ('_' if max(self._angles) > 9 else '').join(map(str, joints))  # c_12 or c_1_2
+        signs = dict(turned)
+        name = ('_' if max(self._angles) > 9 else '').join(  # c_12 or c_1_2; c_1m2
+            f'{"m" if signs[index] < 0 else ""}{index}' for index in joints)
         c = self._define(f'c_{name}', sympy.cos(total, evaluate=False))
         s = self._define(f's_{name}', sympy.sin(total, evaluate=False))
         return c * cc - s * sc, s * cc + c * sc

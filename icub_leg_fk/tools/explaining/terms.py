@@ -35,7 +35,7 @@ def symbol_latex(name: str) -> str:
     """Return `theta_0` with a backslash before it, and its index in braces."""
     letter, _, index = name.partition('_')
     greek = rf'\{letter}' if len(letter) > 1 else letter
-    return f'{greek}_{{{index.replace("_", chr(32))}}}'
+    return f'{greek}_{{{index.replace("_", chr(32)).replace("m", "-")}}}'
 
 
 TEXT = Style(str, lambda number: str(number).replace('**', '^').replace('*', ' '), '({})')

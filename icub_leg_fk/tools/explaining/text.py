@@ -13,10 +13,12 @@ from icub_leg_fk.tools.text import (
     indented,
     matrix,
     position_text,
+    range_notes,
     short,
     WIDTH,
     wrapped,
 )
+import numpy as np
 
 Lines = list[str]
 
@@ -30,10 +32,46 @@ COLUMN_NAMES = [('r_11', 'r_21', 'r_31'), ('r_12', 'r_22', 'r_32'), ('r_13', 'r_
                 ('p_x', 'p_y', 'p_z')]
 
 
+CRAIGS_MATRIX = [
+    ['cos theta_i', '-sin theta_i', '0', 'a_i'],
+    ['sin theta_i cos alpha_i', 'cos theta_i cos alpha_i', '-sin alpha_i', '-d_i sin alpha_i'],
+    ['sin theta_i sin alpha_i', 'cos theta_i sin alpha_i', 'cos alpha_i', 'd_i cos alpha_i'],
+    ['0', '0', '0', '1'],
+]
+
+
+def factor_names(e: Explanation, i: object) -> str:
+    """Return the factors of A_i in the order of the convention."""
+    turn, link = f'Rz(theta_{i}) tz(d_{i})', f'tx(a_{i}) Rx(alpha_{i})'
+    if e.chain.convention == 'modified':
+        return f'Rx(alpha_{i}) tx(a_{i}) {turn}'
+    return f'{turn} {link}'
+
+
+def fixed_row_words(name: str, T: Matrix) -> Lines:
+    """Say which fixed row a transform behind the table is, if it is one."""
+    M = np.array([[float(cell) for cell in row] for row in T])
+    theta = math.atan2(M[1, 0], M[0, 0])
+    a, aside = (math.cos(theta) * M[0, 3] + math.sin(theta) * M[1, 3],
+                math.cos(theta) * M[1, 3] - math.sin(theta) * M[0, 3])
+    if max(abs(M[2, 0]), abs(aside)) > 1e-9:
+        return []
+    alpha = math.atan2(M[2, 1], M[2, 2])
+    return wrapped(f'  {name} is what a last fixed row would be, whose joint stays at 0: '
+                   f'a = {short(a)}, d = {short(M[2, 3])}, alpha = {pi_text(alpha)}, '
+                   f'theta = {short(math.degrees(theta))}')
+
+
+def out_of_range_notes(e: Explanation) -> Lines:
+    """Say which joints are outside their range, as `leg_fk pose` does."""
+    return [] if e.q is None else range_notes(e.chain, e.q)
+
+
 def explanation_text(e: Explanation) -> str:
     """Return the whole explanation."""
     parts = [_heading(e), _z_axes(e), _origins(e), _x_axes(e), _y_axes(e), _dh_convention(e),
              *(_link(e, step) for step in e.steps), _products(e), _answer(e)]
+    parts += [[note] for note in out_of_range_notes(e)]
     return '\n\n'.join('\n'.join(lines) for lines in parts)
 
 
@@ -50,10 +88,15 @@ def link_name(step: Step) -> str:
 
 def origin_reason(e: Explanation, i: int) -> str:
     """Say why the origin of frame i is where it is."""
-    if i == 0:
+    if e.chain.convention == 'modified':
+        if i == len(e.steps):
+            return 'where the last row puts it'
+        link, own, above = e.steps[i].row.link, f'z_{i}', f'z_{i + 1}'
+    elif i == 0:
         return 'where T_Ro0 puts it'
-    link = e.steps[i - 1].row.link
-    above, own, apart = f'z_{i - 1}', f'z_{i}', f'{short(1000 * abs(link.a))} mm'
+    else:
+        link, own, above = e.steps[i - 1].row.link, f'z_{i}', f'z_{i - 1}'
+    apart = f'{short(1000 * abs(link.a))} mm'
     if abs(math.sin(link.alpha)) < 1e-12:
         relation = f'parallel to {above}, {apart} away' if link.a else f'lies on {above}'
         return f'{own} {relation}'
@@ -69,14 +112,15 @@ def table_rows(e: Explanation) -> list[list[str]]:
         link, d, theta = step.row.link, '', ''
         offset = short(math.degrees(link.offset))
         theta = offset
+        sign = '+' if link.sign == 1 else '-'
         if link.is_prismatic:
-            d = f' + {_range(1000 * link.lower, 1000 * link.upper)}'
+            d = f' {sign} {_range(1000 * link.lower, 1000 * link.upper)}'
         elif step.row.joint:
-            theta += f' + {_range(math.degrees(link.lower), math.degrees(link.upper))}'
+            theta += f' {sign} {_range(math.degrees(link.lower), math.degrees(link.upper))}'
         if link.erratum:
             theta += ' *'
         rows.append([f'i = {step.row.index}', short(1000 * link.a), short(1000 * link.d) + d,
-                     pi_text(link.alpha), theta, step.row.joint or '(virtual link)'])
+                     pi_text(link.alpha), theta, step.row.joint or '(fixed)'])
     return rows
 
 
@@ -124,9 +168,11 @@ def _heading(e: Explanation) -> Lines:
 
 
 def _frame_table(e: Explanation, axis: str, column: int, remarks: Sequence[str]) -> Lines:
-    vectors = matrix([[short(value) for value in T[:3, column]] for T in e.frames], gap='  ')
-    rows = [[f'{axis}_{i}', f'= ({vector[1:-1]})', remark]
-            for i, (vector, remark) in enumerate(zip(vectors, remarks, strict=True))]
+    vectors = matrix([[short(value) for value in T[:3, column]] for T in e.frames.values()],
+                     gap='  ')
+    remarks = [*remarks, *(f'as {name} has it' for name, _ in e.tips)]
+    rows = [[f'{axis}_{name}', f'= ({vector[1:-1]})', remark]
+            for name, vector, remark in zip(e.frames, vectors, remarks, strict=True)]
     return indented(columns(rows))
 
 
@@ -138,28 +184,34 @@ def _z_axes(e: Explanation) -> Lines:
     remarks = []
     for step in e.steps:
         verb = 'slides along' if step.row.link.is_prismatic else 'turns about'
-        remarks.append(f'{step.row.joint} {verb} it' if step.row.joint else 'virtual link')
-    remarks.append('no joint: the last frame')
+        remarks.append(f'{step.row.joint} {verb} it' if step.row.joint else 'a fixed row')
+    modified = e.chain.convention == 'modified'
+    last = 'no joint: ' + ('frame 0' if modified else 'the last frame')
+    remarks = [last, *remarks] if modified else [*remarks, last]
     return [f'Step 1. The z axis of each joint   ({_at(e)})',
             *_frame_table(e, 'z', 2, remarks)]
 
 
 def _origins(e: Explanation) -> Lines:
-    remarks = [origin_reason(e, i) for i in range(len(e.frames))]
-    return ['Step 2. The origin of each frame, on z_i where it meets z_(i-1)   (mm)',
+    remarks = [origin_reason(e, i) for i in range(len(e.steps) + 1)]
+    meets = 'z_(i+1)' if e.chain.convention == 'modified' else 'z_(i-1)'
+    return [f'Step 2. The origin of each frame, on z_i where it meets {meets}   (mm)',
             *_frame_table(e, 'o', 3, remarks)]
 
 
 def _x_axes(e: Explanation) -> Lines:
     remarks = ['as T_Ro0 has it'] + [f'orthogonal to z_{i} and z_{i + 1}'
                                      for i in range(len(e.steps))]
-    return ['Step 3. The x axis of each frame, orthogonal to z_(i-1) and z_i',
+    if e.chain.convention == 'modified':
+        remarks = [f'orthogonal to z_{i} and z_{i + 1}' for i in range(len(e.steps))] + ['free']
+    return [f'Step 3. The x axis of each frame, orthogonal to z_i and the z axis '
+            f'{"behind" if e.chain.convention == "modified" else "before"} it',
             *_frame_table(e, 'x', 0, remarks)]
 
 
 def _y_axes(e: Explanation) -> Lines:
     return ['Step 4. The y axis of each frame, by the right-hand rule: y_i = z_i x x_i',
-            *_frame_table(e, 'y', 1, [''] * len(e.frames))]
+            *_frame_table(e, 'y', 1, [''] * (len(e.steps) + 1))]
 
 
 def _dh_convention(e: Explanation) -> Lines:
@@ -169,8 +221,11 @@ def _dh_convention(e: Explanation) -> Lines:
     for step in e.steps:
         if step.row.link.erratum:
             lines += indented(wrapped(f'* range of i = {step.row.index}: {step.row.link.erratum}'))
-    lines += ['', '  A_i = T_i(i+1) = Rz(theta_i) tz(d_i) tx(a_i) Rx(alpha_i)', '']
-    lines += indented(beside('=', matrix(GENERAL_MATRIX, gap='   ')), 6)
+    lines += ['', f'  A_i = T_i(i+1) = {factor_names(e, "i")}', '']
+    general = CRAIGS_MATRIX if e.chain.convention == 'modified' else GENERAL_MATRIX
+    lines += indented(beside('=', matrix(general, gap='   ')), 6)
+    lines += [line for name, T in e.tips for line in ['', *fixed_row_words(name, T)]
+              if fixed_row_words(name, T)]
     if e.symbols:
         defined = [[name, f'= {" ".join(_with_value(e, meaning))}']
                    for name, meaning in defined_symbols(e)]
@@ -181,9 +236,9 @@ def _dh_convention(e: Explanation) -> Lines:
 
 def _link(e: Explanation, step: Step) -> Lines:
     i = step.row.index
-    title = f'A_{i} = {link_name(step)} = Rz(theta_{i}) tz(d_{i}) tx(a_{i}) Rx(alpha_{i})'
+    title = f'A_{i} = {link_name(step)} = {factor_names(e, i)}'
     blocks = [matrix(_cells(factor)) for factor in step.factors]
-    return [f'{title}   {step.row.joint or "virtual link"}',
+    return [f'{title}   {step.row.joint or "fixed"}',
             '  ' + '   '.join(link_values(e, step)), '',
             *indented(beside('=', *blocks)), '',
             *_equals(e, '', step.A)]
@@ -204,10 +259,14 @@ def _answer(e: Explanation) -> Lines:
         lines += ['', *_equals(e, name, T)]
     lines += ['', *_equals(e, root_names(e), e.T_root_tip)]
     if e.q is not None:
-        x, y, z = (short(number(row[3], e.symbols) or 0.0) for row in e.T_root_tip[:3])
-        lines += ['', f'{e.chain.tip_frame} is at x = {x}, y = {y}, z = {z} mm in '
-                      f'{e.chain.root_frame}.']
+        lines += ['', closing_sentence(e)]
     return lines
+
+
+def closing_sentence(e: Explanation) -> str:
+    """Say where the tip is."""
+    x, y, z = (short(number(row[3], e.symbols) or 0.0) for row in e.T_root_tip[:3])
+    return f'{e.chain.tip_frame} is at x = {x}, y = {y}, z = {z} mm in {e.chain.root_frame}.'
 
 
 def _cells(T: Matrix) -> list[list[str]]:
