@@ -31,7 +31,8 @@ class Trial:
              for joint, link in zip(chain.joint_names, chain.joints, strict=True)}
             for chain in chains], timeout)
         self.reported = Counter()
-        self.input = JointInput(chains, timeout / SECOND, lambda: self.now, self._report)
+        self.input = JointInput(chains, timeout / SECOND, lambda: self.now, self._report,
+                                velocities=True)
 
     def _report(self, reason, text):
         self.reported[reason] += 1

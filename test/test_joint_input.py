@@ -23,14 +23,15 @@ def joint_state(ms, names, positions, velocities=(), **more):
 class Robot:
     """A joint input of both legs, with what it reported."""
 
-    def __init__(self, joint_timeout=0.5):
+    def __init__(self, joint_timeout=0.5, velocities=True):
         catalog = Catalog.load()
         self.chains = [catalog.chain(name, 'v2_5') for name in ('left_leg', 'right_leg')]
         self.left, self.right = (chain.joint_names for chain in self.chains)
         self.both = self.left + self.right
         self.reports = []
         self.input = JointInput(self.chains, joint_timeout, lambda: START,
-                                lambda reason, text: self.reports.append((reason, text)))
+                                lambda reason, text: self.reports.append((reason, text)),
+                                velocities)
 
     def send(self, ms, names, positions=None, velocities=()):
         """Send a message at a time [ms from the start] and return what it made ready."""
@@ -224,6 +225,16 @@ def test_velocities_that_are_absent_short_or_not_finite_are_none(robot, velociti
     robot.send(0, robot.left, [0.1] * 6, [1.0] * 6)
     [vector] = robot.send(1, robot.left, [0.1] * 6, velocities)
     assert vector.velocities is None
+
+
+def test_velocities_that_nobody_wants_are_none_and_none_are_known_when_they_are_wanted_again():
+    unwanting = Robot(velocities=False)
+    [vector] = unwanting.send(0, unwanting.left, [0.1] * 6, [1.0] * 6)
+    assert vector.velocities is None
+    wanting = Robot()
+    wanting.input.take_over(unwanting.input)
+    assert wanting.send(1, wanting.left[:5], [0.1] * 5, [1.0] * 5)[0].velocities is None
+    assert wanting.send(2, wanting.left[5:], [0.1], [2.0])[0].velocities == (1.0,) * 5 + (2.0,)
 
 
 def test_what_strangers_send_is_not_hoarded(robot):

@@ -77,7 +77,7 @@ def test_first_poses_degrees_and_quarrelling_publishers_are_told_once():
             return all(text in log for text in texts)
         topic = f'{node.namespace}/joint_states'
         robot.until(lambda: said(
-            'publishing poses, twists of left_foot',
+            'publishing poses and twists of left_foot',
             f'first pose of left_foot; 2 publishers on {topic}', 'first pose of right_foot',
             f'2 publishers on {topic}, and their stamps step back',
             'left_leg: positions look like degrees, radians are expected: l_knee -45'), node.log)

@@ -27,20 +27,33 @@ STAMP_END = 12  # encapsulation and stamp; frame_id follows
 _ENCAPSULATION = b'\x00\x01\x00\x00'
 
 
-class JointStateHead(NamedTuple):
-    """What a JointState begins with; as a rule the same in every message of a publisher.
+class Doubles(NamedTuple):
+    """Offset and number of the doubles of a sequence."""
+
+    at: int
+    n: int
+
+
+class JointStateLayout(NamedTuple):
+    """All but the numbers of a JointState; as a rule the same in every message of a publisher.
 
     Attributes:
         byte_order: `<` or `>`.
         names: joint names.
-        end: offset of the count of positions, which follows.
-        padding: offset and size of what is skipped for alignment before it.
+        padding: offset and size of what is skipped for alignment up to the names' end.
+        names_end: offset of the count of positions, which follows the names.
+        positions: where the positions are.
+        velocities: where the velocities are.
+        efforts: where the efforts are.
     """
 
     byte_order: str
     names: tuple[str, ...]
-    end: int
     padding: tuple[tuple[int, int], ...]
+    names_end: int
+    positions: Doubles
+    velocities: Doubles
+    efforts: Doubles
 
 
 class JointStateMessage(NamedTuple):
@@ -53,31 +66,36 @@ class JointStateMessage(NamedTuple):
     velocities: tuple[float, ...]
 
 
-def decode_head(data: bytes) -> JointStateHead:
-    """Decode a serialized JointState up to its positions.
-
-    Raises:
-        MalformedMessageError: as for `decode_joint_state`.
-    """
-    reader = _Reader(data)
-    reader.stamp()
-    names = reader.names()
-    return JointStateHead(reader.byte_order, names, reader.align(4), tuple(reader.padding))
-
-
-def decode_joint_state(data: bytes) -> JointStateMessage:
-    """Decode a serialized JointState.
+def read_layout(data: bytes) -> JointStateLayout:
+    """Find out where things lie in a serialized JointState.
 
     Raises:
         MalformedMessageError: the bytes end too early, a length is absurd, or the encoding is
             not plain CDR; names the field.
     """
     reader = _Reader(data)
-    sec, nanosec = reader.stamp()
-    names = reader.names()
-    positions, velocities = reader.doubles('position'), reader.doubles('velocity')
-    reader.doubles('effort')
-    return JointStateMessage(sec, nanosec, names, positions, velocities)
+    reader.take('header.stamp', 8)
+    reader.string('header.frame_id')
+    # A string takes at least its length field: no more of them than a quarter of the rest.
+    names = tuple([reader.string('name') for _ in range(reader.length('name', 4))])
+    names_end = reader.align(4)
+    padding = tuple(reader.padding)
+    return JointStateLayout(reader.byte_order, names, padding, names_end, *map(
+        reader.doubles, ('position', 'velocity', 'effort')))
+
+
+def decode_joint_state(data: bytes) -> JointStateMessage:
+    """Decode a serialized JointState.
+
+    Raises:
+        MalformedMessageError: as for `read_layout`.
+    """
+    layout = read_layout(data)
+    sec, nanosec = struct.unpack_from(f'{layout.byte_order}iI', data, HEADER)
+    positions, velocities = (
+        struct.unpack_from(f'{layout.byte_order}{n}d', data, at)
+        for at, n in (layout.positions, layout.velocities))
+    return JointStateMessage(sec, nanosec, layout.names, positions, velocities)
 
 
 class PoseStampedEncoder:
@@ -178,46 +196,7 @@ class _Reader:
             self._at += padding
         return self._at
 
-    def stamp(self) -> tuple[int, int]:
-        """Return seconds and nanoseconds."""
-        sec, nanosec = struct.unpack_from(f'{self.byte_order}iI', self._data,
-                                          self._take('header.stamp', 8))
-        return sec, nanosec
-
-    def names(self) -> tuple[str, ...]:
-        """Pass over frame_id and return the names behind it."""
-        self._string('header.frame_id')
-        # A string takes at least its length field: no more of them than a quarter of the rest.
-        return tuple([self._string('name') for _ in range(self._length('name', 4))])
-
-    def doubles(self, field: str) -> tuple[float, ...]:
-        """Return the numbers of a sequence."""
-        count = self._length(field, 8)
-        if count:
-            self.align(8)
-        return struct.unpack_from(f'{self.byte_order}{count}d', self._data,
-                                  self._take(field, 8 * count))
-
-    def _length(self, field: str, item_size: int) -> int:
-        """Return the count of items that follow; they fit in what is left."""
-        self.align(4)
-        count: int = struct.unpack_from(f'{self.byte_order}I', self._data,
-                                        self._take(field, 4))[0]
-        left = len(self._data) - self._at
-        if count * item_size > left:
-            raise MalformedMessageError(f'JointState: {field} has {count} items; allowed: what '
-                                        f'fits in the {left} bytes left')
-        return count
-
-    def _string(self, field: str) -> str:
-        size = self._length(field, 1)
-        start = self._take(field, size)
-        text = self._data[start:self._at]
-        if size and text.find(0) != size - 1:
-            raise MalformedMessageError(f'JointState: {field} is no string that ends with NUL')
-        return text[:-1].decode('utf-8', 'replace')
-
-    def _take(self, field: str, size: int) -> int:
+    def take(self, field: str, size: int) -> int:
         """Return the present offset and go on behind as many bytes."""
         start = self._at
         self._at = start + size
@@ -225,6 +204,33 @@ class _Reader:
             raise MalformedMessageError(f'JointState: {field} ends at byte {self._at}; allowed: '
                                         f'{len(self._data)}')
         return start
+
+    def length(self, field: str, item_size: int) -> int:
+        """Return the count of items that follow; they fit in what is left."""
+        self.align(4)
+        count: int = struct.unpack_from(f'{self.byte_order}I', self._data,
+                                        self.take(field, 4))[0]
+        left = len(self._data) - self._at
+        if count * item_size > left:
+            raise MalformedMessageError(f'JointState: {field} has {count} items; allowed: what '
+                                        f'fits in the {left} bytes left')
+        return count
+
+    def string(self, field: str) -> str:
+        """Return the string that follows."""
+        size = self.length(field, 1)
+        start = self.take(field, size)
+        text = self._data[start:self._at]
+        if size and text.find(0) != size - 1:
+            raise MalformedMessageError(f'JointState: {field} is no string that ends with NUL')
+        return text[:-1].decode('utf-8', 'replace')
+
+    def doubles(self, field: str) -> Doubles:
+        """Pass over a sequence of numbers."""
+        count = self.length(field, 8)
+        if count:
+            self.align(8)
+        return Doubles(self.take(field, 8 * count), count)
 
 
 def _string(text: str) -> bytes:

@@ -54,7 +54,8 @@ class FootPosePublisher(Node):
     def _configure(self, configuration: Configuration) -> None:
         """Begin to work as configured, with the joints that are already known."""
         joint_input = JointInput(configuration.chains, configuration.joint_timeout,
-                                 lambda: self.get_clock().now().nanoseconds, self._warnings)
+                                 lambda: self.get_clock().now().nanoseconds, self._warnings,
+                                 configuration.publish_twist)
         joint_input.take_over(self._input)
         self._input = joint_input
         self._outputs.configure(configuration)
@@ -73,4 +74,5 @@ def _published(configuration: Configuration) -> str:
     chains = ', '.join(
         f'{chain.tip} ({chain.name} {chain.version}, {prefix}{chain.root_frame} to '
         f'{prefix}{chain.tip_frame})' for chain in configuration.chains)
+    kinds[-2:] = [' and '.join(kinds[-2:])]
     return f'{", ".join(kinds)} of {chains}'

@@ -14,9 +14,9 @@ The rules:
 
 Everything refused is counted by reason, and reported with the joint or field it concerns.
 
-A robot sends the same names in the same order a thousand times a second. So for the bytes of the
-names that it has seen, a `JointInput` remembers which numbers behind them are of concern, and
-unpacks just those. That is a cache: dropped, it costs time and nothing else.
+A robot sends the same names in the same order a thousand times a second. So a `JointInput`
+remembers, for the names and lengths that it has seen, which numbers are of concern and where they
+lie, and unpacks just those. That is a cache: dropped, it costs time and nothing else.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise, repeat
 import math
 from operator import itemgetter
 import struct
@@ -31,13 +32,7 @@ from typing import Any, NamedTuple
 
 from icub_leg_fk.errors import MalformedMessageError
 from icub_leg_fk.kinematics import Chain
-from icub_leg_fk.ros.cdr import (
-    decode_head,
-    decode_joint_state,
-    HEADER,
-    JointStateHead,
-    STAMP_END,
-)
+from icub_leg_fk.ros.cdr import HEADER, JointStateLayout, read_layout, STAMP_END
 
 LARGEST_VALUE = 1e150  # of a position or velocity; beyond it sums and products overflow
 MESSAGE_REASONS = ('malformed', 'empty_position', 'short_position', 'duplicate_name', 'time_jump')
@@ -58,7 +53,8 @@ class Ready(NamedTuple):
         sec: seconds of the stamp.
         nanosec: nanoseconds of the stamp.
         positions: n joint positions [rad or m].
-        velocities: n joint velocities [rad/s or m/s]; None if one is not known, or not finite.
+        velocities: n joint velocities [rad/s or m/s]; None if they are not wanted, or one is not
+            known, or not finite.
     """
 
     chain: int
@@ -104,53 +100,65 @@ class _Joints:
 
 
 class _Layout:
-    """What the messages of one list of names bring, and where."""
+    """What the messages of one list of names and of these lengths bring, and where."""
 
-    def __init__(self, data: bytes, head: JointStateHead, joints: _Joints) -> None:
-        self.names = head.names
+    def __init__(self, data: bytes, layout: JointStateLayout, joints: _Joints) -> None:
+        self.names = layout.names
         self.last_message = 0  # number of the last message that had it
-        self.duplicate = next((name for name, count in Counter(head.names).items() if count > 1),
-                              None)
-        self.end = head.end
-        self.stamp = struct.Struct(f'{head.byte_order}iI').unpack_from
-        self.count = struct.Struct(f'{head.byte_order}I').unpack_from
-        self.encapsulation = bytes(data[:2])
-        self.head = data[STAMP_END:head.end]
-        mask = bytearray(b'\xff' * head.end)
-        for at, size in head.padding:
+        self.refusal = _refusal(layout)
+        order = layout.byte_order
+        self._encapsulation = bytes(data[:2])
+        self._names_end = layout.names_end
+        self._size = layout.efforts.at + 8 * layout.efforts.n
+        self._head = data[STAMP_END:layout.names_end]
+        mask = bytearray(b'\xff' * layout.names_end)
+        for at, size in layout.padding:
             mask[at:at + size] = bytes(size)
         self._mask = int.from_bytes(mask[STAMP_END:], 'little')
-        self._masked_head = int.from_bytes(self.head, 'little') & self._mask
+        self._masked_head = int.from_bytes(self._head, 'little') & self._mask
+        counts_at = (layout.names_end, *(
+            doubles.at + 8 * doubles.n for doubles in (layout.positions, layout.velocities)))
+        self._counts = tuple(doubles.n for doubles in (
+            layout.positions, layout.velocities, layout.efforts))
+        gaps = [after - before - 4 for before, after in pairwise(counts_at)]
+        self._read_counts = struct.Struct(f'{order}I{gaps[0]}xI{gaps[1]}xI').unpack_from
+        self.stamp = struct.Struct(f'{order}iI').unpack_from
+        self.positions_at = layout.positions.at
+        self.velocities_at = (layout.velocities.at
+                              if layout.velocities.n >= len(layout.names) else None)
         places: dict[int, int] = {}
-        for index, name in enumerate(head.names):
+        for index, name in enumerate(layout.names):
             if name in joints.slots:
                 places.setdefault(joints.slots[name], index)
         self.slots = tuple(places)
         skips = [index - before - 1 for before, index in zip(
             (-1, *places.values()), places.values())]
-        self.numbers = struct.Struct(head.byte_order + ''.join(
-            f'{8 * skip}xd' for skip in skips)).unpack_from
+        self.numbers = struct.Struct(order + ''.join(f'{8 * skip}xd' for skip in skips)
+                                     ).unpack_from
         # Of each chain touched: what picks its joints, if they are all here.
         self.chains: list[tuple[int, Callable[[Any], Any] | None]] = []
-        order = {slot: i for i, slot in enumerate(self.slots)}
+        place = {slot: i for i, slot in enumerate(self.slots)}
         for chain, slots in enumerate(joints.of_chain):
-            if touched := order.keys() & set(slots):
-                self.chains.append((chain, _picker([order[slot] for slot in slots])
+            if touched := place.keys() & set(slots):
+                self.chains.append((chain, _picker([place[slot] for slot in slots])
                                     if len(touched) == len(slots) else None))
 
     def fits(self, data: bytes) -> bool:
-        """Return whether data begins with these names, whatever its padding holds."""
-        if data[:2] != self.encapsulation:
+        """Return whether data has these names and lengths, whatever its padding holds."""
+        if (len(data) < self._size or data[:2] != self._encapsulation
+                or self._read_counts(data, self._names_end) != self._counts):
             return False
-        if data.startswith(self.head, STAMP_END):
+        if data.startswith(self._head, STAMP_END):
             return True
-        head = data[STAMP_END:self.end]
+        head = data[STAMP_END:self._names_end]
         if int.from_bytes(head, 'little') & self._mask != self._masked_head:
             return False
-        if len(head) != len(self.head):
-            return False
-        self.head = head
+        self._head = head
         return True
+
+    def is_long(self) -> bool:
+        """Return whether the names take too much room to be remembered."""
+        return self._names_end > _LARGEST_REMEMBERED
 
 
 class JointInput:
@@ -161,6 +169,7 @@ class JointInput:
         joint_timeout: greatest age of a joint beside the newest of its chain [s]; 0 is none.
         now: returns the present time [ns], which stamps messages with a zero stamp.
         report: called with a reason and one line of text for everything worth a warning.
+        velocities: whether velocities are wanted too.
 
     Attributes:
         messages: messages seen.
@@ -170,7 +179,8 @@ class JointInput:
     """
 
     def __init__(self, chains: Sequence[Chain], joint_timeout: float, now: Callable[[], int],
-                 report: Callable[[str, str], None] = lambda reason, text: None) -> None:
+                 report: Callable[[str, str], None] = lambda reason, text: None,
+                 velocities: bool = False) -> None:
         self.chains = tuple(chains)
         self.messages = 0
         self.counts: Counter[str] = Counter()
@@ -178,6 +188,7 @@ class JointInput:
         self.newest: int | None = None
         self._now = now
         self._report = report
+        self._velocities = velocities
         self._timeout_ns = round(joint_timeout * 1e9)
         self._joints = _Joints(self.chains)
         self._bounds = [[(max(lower, -_LARGEST_USABLE), min(upper, _LARGEST_USABLE))
@@ -191,15 +202,17 @@ class JointInput:
         self.messages += 1
         try:
             layout = self._layout(data)
-            sec, nanosec = layout.stamp(data, HEADER)
-            positions, velocities = self._numbers(data, layout)
         except MalformedMessageError as error:
             self._reject('malformed', f'{error}; message ignored')
             return []
         self._latest = layout
         layout.last_message = self.messages
-        if positions is None or not layout.slots:
+        if layout.refusal is not None:
+            self._reject(*layout.refusal)
             return []
+        if not layout.slots:
+            return []
+        sec, nanosec = layout.stamp(data, HEADER)
         if sec == 0 and nanosec == 0:
             sec, nanosec = divmod(self._now(), 1_000_000_000)
             if sec > _LAST_SECOND:  # a bag may say it was recorded then
@@ -207,28 +220,32 @@ class JointInput:
                              f'up to {_LAST_SECOND} s; message ignored')
                 return []
         stamp = sec * 1_000_000_000 + nanosec
+        joints = self._joints
         if self.newest is None or stamp >= self.newest:
             self.newest = stamp
         elif self._stepped_back(stamp, layout):
             self._reject('time_jump', f'time stepped back to {stamp / 1e9:.3f} s; held joints are '
                          'forgotten')
-            self._joints.forget()
+            joints.forget()
             self.newest = stamp
-        joints = self._joints
-        for slot, position, velocity in zip(layout.slots, positions, velocities):
-            joints.stamps[slot] = stamp
-            joints.positions[slot] = position
-            joints.velocities[slot] = velocity
+        positions = layout.numbers(data, layout.positions_at)
+        stamps, held = joints.stamps, joints.positions
+        for slot, position in zip(layout.slots, positions):
+            stamps[slot] = stamp
+            held[slot] = position
+        if self._velocities:
+            velocities = (layout.numbers(data, layout.velocities_at)
+                          if layout.velocities_at is not None else repeat(_UNKNOWN))
+            for slot, velocity in zip(layout.slots, velocities):
+                joints.velocities[slot] = velocity
         ready = []
         for chain, pick in layout.chains:
             if pick is not None:
-                q, qdot = pick(positions), pick(velocities)
+                q = pick(positions)
             elif self._is_missing_or_stale(chain):
                 continue
             else:
-                slots = joints.of_chain[chain]
-                q = tuple([joints.positions[slot] for slot in slots])
-                qdot = tuple([joints.velocities[slot] for slot in slots])
+                q = tuple([held[slot] for slot in joints.of_chain[chain]])
             for value, (lower, upper) in zip(q, self._bounds[chain]):
                 if not lower <= value <= upper:
                     usable = self._note_positions(chain, q)
@@ -237,7 +254,8 @@ class JointInput:
                 usable = True
             if usable:
                 self.chain_counts[chain].ready += 1
-                ready.append(Ready(chain, sec, nanosec, q, qdot if _are_usable(qdot) else None))
+                qdot = self._velocities_of(chain) if self._velocities else None
+                ready.append(Ready(chain, sec, nanosec, q, qdot))
         return ready
 
     def note_no_velocity(self, chain: int) -> None:
@@ -265,7 +283,8 @@ class JointInput:
             if (old := theirs.slots.get(name)) is not None:
                 ours.stamps[slot] = theirs.stamps[old]
                 ours.positions[slot] = theirs.positions[old]
-                ours.velocities[slot] = theirs.velocities[old]
+                if previous._velocities:
+                    ours.velocities[slot] = theirs.velocities[old]
         self.newest = max((stamp for stamp in ours.stamps if stamp is not None), default=None)
 
     def known_joints(self, chain: int) -> dict[str, int]:
@@ -288,41 +307,16 @@ class JointInput:
                 if index:  # the likeliest first
                     layouts.insert(0, layouts.pop(index))
                 return layout
-        layout = _Layout(data, decode_head(data), self._joints)
-        if layout.end <= _LARGEST_REMEMBERED:
+        layout = _Layout(data, read_layout(data), self._joints)
+        if not layout.is_long():
             layouts.insert(0, layout)
             del layouts[_REMEMBERED_LAYOUTS:]
         return layout
 
-    def _numbers(self, data: bytes, layout: _Layout
-                 ) -> tuple[tuple[float, ...] | None, Sequence[float]]:
-        """Return positions and velocities of the layout's joints; None if they are refused."""
-        count = layout.count
-        try:
-            positions_at, n_positions, at = _sequence(data, layout.end, count)
-            velocities_at, n_velocities, at = _sequence(data, at, count)
-            at = _sequence(data, at, count)[2]
-        except struct.error:
-            at = len(data) + 1
-        if at > len(data):
-            decode_joint_state(data)  # which says where it ends too early
-            raise MalformedMessageError('JointState ends too early')
-        if n_positions == 0:
-            self.counts['empty_position'] += 1
-            return None, ()
-        n = len(layout.names)
-        if n_positions < n:
-            self._reject('short_position', f'position has {n_positions} values for {n} names; '
-                         'message ignored')
-            return None, ()
-        if layout.duplicate is not None:
-            self._reject('duplicate_name', f'name {layout.duplicate[:60]!r} appears twice; '
-                         'message ignored')
-            return None, ()
-        positions = layout.numbers(data, positions_at)
-        if n_velocities < n:
-            return positions, (_UNKNOWN,) * len(positions)
-        return positions, layout.numbers(data, velocities_at)
+    def _velocities_of(self, chain: int) -> tuple[float, ...] | None:
+        """Return the velocities of a chain's joints; None if one is unknown or not finite."""
+        qdot = tuple([self._joints.velocities[slot] for slot in self._joints.of_chain[chain]])
+        return qdot if _are_usable(qdot) else None
 
     def _stepped_back(self, stamp: int, layout: _Layout) -> bool:
         assert self.newest is not None
@@ -385,16 +379,22 @@ class JointInput:
 
     def _reject(self, reason: str, text: str) -> None:
         self.counts[reason] += 1
-        self._report(reason, text)
+        if text:
+            self._report(reason, text)
 
 
-def _sequence(data: bytes, at: int, count: Callable[..., tuple[int]]) -> tuple[int, int, int]:
-    """Return offset and number of the doubles whose count is at an offset, and where they end."""
-    n, = count(data, at)
-    start = at + 4
-    if n:
-        start += (HEADER - start) % 8
-    return start, n, start + 8 * n
+def _refusal(layout: JointStateLayout) -> tuple[str, str] | None:
+    """Return why messages of a layout are refused as a whole, and what to report of it."""
+    names, n = layout.names, len(layout.names)
+    if layout.positions.n == 0:
+        return 'empty_position', ''  # which is counted only
+    if layout.positions.n < n:
+        return 'short_position', (f'position has {layout.positions.n} values for {n} names; '
+                                  'message ignored')
+    if len(set(names)) < n:
+        twice = next(name for name, count in Counter(names).items() if count > 1)
+        return 'duplicate_name', f'name {twice[:60]!r} appears twice; message ignored'
+    return None
 
 
 def _are_usable(values: Sequence[float]) -> bool:

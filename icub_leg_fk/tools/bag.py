@@ -176,7 +176,7 @@ class _Job:
         self._first = self._last = 0
         self._was_held_back: list[Counter[str]] = []
         self._input = JointInput(configuration.chains, configuration.joint_timeout,
-                                 lambda: self._time)
+                                 lambda: self._time, velocities=configuration.publish_twist)
         self._outputs = [_ChainOutput(chain, configuration) for chain in configuration.chains]
         self._notes = list(configuration.notes)
         self._copied = 0
