@@ -149,7 +149,7 @@ def test_frame_prefix_holds_for_twists_and_topics_go_when_they_are_switched_off(
     robot.until(lambda: robot.node.count_publishers(topic) == 0, 'the twist topic to go')
 
 
-def test_skeletons_go_through_the_frames_of_each_leg():
+def test_skeletons_go_through_the_frames_of_each_leg_to_the_outline_of_its_sole():
     with NodeProcess({'publish_markers': True, 'frame_prefix': 'x/', 'foot_frame': 'sole'}) \
             as node, Robot(node) as robot:
         inbox = []
@@ -164,17 +164,25 @@ def test_skeletons_go_through_the_frames_of_each_leg():
         assert set(by_chain) == {'left_leg', 'right_leg'}
         for chain, part in CHAINS.values():
             frames = Catalog.load().chain(chain, 'v2_5', 'sole').frames(Q[part])
+            *legs, sole = by_chain[chain]
+            corners = np.array([[point.x, point.y, point.z] for point in sole.points])
+            R, p = np.split(oracle_pose(chain, 'v2_5', Q[part], 'sole')[:3], [3], axis=1)
+            np.testing.assert_allclose(  # in the sole's axes: x forward, y left, z up
+                (corners - p.T) @ R, [[x, y, 0.0] for x, y in (
+                    (-0.07, 0.04), (0.12, 0.04), (0.12, -0.04), (-0.07, -0.04), (-0.07, 0.04))],
+                rtol=0, atol=1e-12)
             for marker in by_chain[chain]:
                 assert marker.header.frame_id == 'x/root_link'
                 assert (marker.header.stamp.sec, marker.header.stamp.nanosec) == (1, 0)
                 assert (marker.action, marker.color.a) == (Marker.ADD, 1.0)
+            for marker in legs:
                 points = np.array([[point.x, point.y, point.z] for point in marker.points])
                 np.testing.assert_allclose(points[1:], frames[:, :3, 3], rtol=0, atol=1e-12)
                 np.testing.assert_allclose(
                     points[-1], oracle_pose(chain, 'v2_5', Q[part])[:3, 3], atol=1e-12)
                 assert not points[0].any()
-            assert [marker.type for marker in by_chain[chain]] == [Marker.LINE_STRIP,
-                                                                   Marker.SPHERE_LIST]
+            assert [marker.type for marker in by_chain[chain]] == [
+                Marker.LINE_STRIP, Marker.SPHERE_LIST, Marker.LINE_STRIP]
         # Viewers forget the skeletons of chains that are dropped.
         robot.spin()
         inbox.clear()

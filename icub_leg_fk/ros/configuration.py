@@ -10,6 +10,7 @@ from typing import Any
 from icub_leg_fk.errors import LegFKError, ParameterError
 from icub_leg_fk.kinematics import Catalog, Chain
 
+SOLE = 'sole'
 STAMP_SOURCES = ('message', 'now')
 DEFAULT_FRAME = 'dh'
 DEFAULT_TIMEOUT = 0.5  # s
@@ -22,6 +23,7 @@ class Configuration:
 
     Attributes:
         chains: the chains to publish, in the foot frame asked for.
+        soles: the same chains down to their soles; None for one that has no sole frame.
         notes: what a user should know of this choice, one line each.
         warnings: what is doubtful in the kinematics file, one line each.
         frame_prefix: put before every frame id.
@@ -33,6 +35,7 @@ class Configuration:
     """
 
     chains: tuple[Chain, ...]
+    soles: tuple[Chain | None, ...]
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
     frame_prefix: str
@@ -80,6 +83,10 @@ class Configuration:
         chains = tuple(_chain(name, values, catalog) for name in names)
         return cls(
             chains=chains,
+            soles=tuple(
+                catalog.chain(chain.name, chain.version, SOLE)
+                if SOLE in _tip_frames(catalog, chain.name, chain.version) else None
+                for chain in chains),
             notes=tuple(f'{chain.name} has no {values["foot_frame"]} frame; its pose is that of '
                         f'{prefix}{chain.tip_frame}' for chain in chains if values['foot_frame']
                         not in _tip_frames(catalog, chain.name, chain.version)),

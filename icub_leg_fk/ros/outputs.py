@@ -109,7 +109,7 @@ class Outputs:
                     twist = output.chain.twist(q, qdot)
                     output.send_twist(output.encode_twist(sec, nanosec, twist))
             if self._publish_skeleton is not None:
-                self._publish_skeleton(self._skeleton(output.chain, q, sec, nanosec))
+                self._publish_skeleton(self._skeleton(index, q, sec, nanosec))
         if send_tf is not None and tf_chains:
             encoder = self._tf_encoder(tuple(tf_chains))
             send_tf(encoder.encode(sec, nanosec, tf_poses))
@@ -143,11 +143,12 @@ class Outputs:
                 for chain in (self._configuration.chains[index] for index in chains)])
         return self._tf_encoders[chains]
 
-    def _skeleton(self, chain: Chain, q: tuple[float, ...], sec: int, nanosec: int) -> Any:
+    def _skeleton(self, index: int, q: tuple[float, ...], sec: int, nanosec: int) -> Any:
         from icub_leg_fk.ros.skeleton import skeleton_markers
-        assert self._configuration is not None
-        return skeleton_markers(chain, q, Time(sec=sec, nanosec=nanosec),
-                                self._configuration.frame_prefix)
+        configuration = self._configuration
+        assert configuration is not None
+        return skeleton_markers(configuration.chains[index], configuration.soles[index], q,
+                                Time(sec=sec, nanosec=nanosec), configuration.frame_prefix)
 
     def _create(self, topic: str, message_type: Any) -> Publisher:
         options = {} if topic == _TF else {'qos_overriding_options': OVERRIDABLE}
