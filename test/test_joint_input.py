@@ -54,18 +54,6 @@ def robot():
     return Robot()
 
 
-def test_joints_are_matched_by_name_in_any_order_among_others(robot):
-    rng = np.random.default_rng(1)
-    names = [*robot.both, 'neck_pitch', 'l_elbow', '']
-    angles = dict(zip(names, rng.uniform(-1, 1, len(names)).tolist()))
-    for ms in range(20):
-        rng.shuffle(names)
-        left, right = robot.send(ms, names, [angles[name] for name in names])
-        assert left.positions == tuple(angles[name] for name in robot.left)
-        assert right.positions == tuple(angles[name] for name in robot.right)
-    assert robot.reports == []
-
-
 def test_a_chain_is_ready_when_its_last_joint_came(robot):
     assert robot.ready(0, robot.left[:4]) == []
     reason, text = robot.reported()
@@ -73,19 +61,6 @@ def test_a_chain_is_ready_when_its_last_joint_came(robot):
     assert text == ('left_leg: no pose: l_ankle_pitch never seen, l_ankle_roll never seen')
     assert robot.ready(1, robot.left[4:]) == [LEFT]
     assert robot.ready(2, robot.left[:1]) == [LEFT]
-
-
-def test_a_message_makes_only_the_chains_it_touches_ready(robot):
-    assert robot.ready(0, robot.both) == [LEFT, RIGHT]
-    assert robot.ready(1, robot.right) == [RIGHT]
-    assert robot.ready(2, robot.left) == [LEFT]
-    assert robot.ready(3, ['neck_pitch']) == []
-
-
-def test_partial_messages_update_just_what_they_bring(robot):
-    robot.send(0, robot.left, [0.1] * 6)
-    [vector] = robot.send(1, robot.left[2:4], [0.3, -0.4])
-    assert vector.positions == (0.1, 0.1, 0.3, -0.4, 0.1, 0.1)
 
 
 @pytest.mark.parametrize(('timeout', 'age', 'ready'), [
@@ -99,12 +74,6 @@ def test_a_joint_older_than_the_timeout_beside_its_newest_peer_holds_the_chain_b
         assert robot.reported() == (
             'stale_joint', f'left_leg: no pose: l_hip_pitch {age / 1000:.3f} s old')
         assert robot.ready(age + 1, robot.left[:1]) == [LEFT]
-
-
-def test_age_counts_beside_the_chains_own_joints_only(robot):
-    robot.send(0, robot.left)
-    robot.send(400, robot.right)
-    assert robot.ready(450, robot.left[:1]) == [LEFT]
 
 
 @pytest.mark.parametrize('short', [1, 5])
@@ -175,22 +144,6 @@ def test_a_looping_bag_goes_on_with_the_very_message_and_says_so_once(robot):
         'time stepped back to 1700000000.000 s; held joints are forgotten')
 
 
-def test_a_step_back_forgets_the_joints_of_every_chain(robot):
-    robot.send(10_000, robot.both)
-    assert robot.ready(0, robot.left) == [LEFT]
-    assert robot.input.known_joints(RIGHT) == {}
-    assert robot.ready(1, robot.right[:5]) == []
-    assert robot.ready(2, robot.right) == [RIGHT]
-
-
-def test_publishers_of_different_joints_may_interleave_out_of_order(robot):
-    robot.send(0, robot.both)
-    for ms in range(10, 1000, 10):
-        assert robot.ready(ms, robot.left) == [LEFT]
-        assert robot.ready(ms - 5, robot.right) == [RIGHT]
-    assert robot.reports == []
-
-
 @pytest.mark.parametrize('older', [0, 1])
 def test_a_joint_older_than_what_is_held_of_it_is_a_step_back(robot, older):
     for nanosec in (10, 10 - older):
@@ -205,13 +158,6 @@ def test_a_message_older_than_anything_held_by_more_than_the_timeout_is_a_step_b
     assert robot.input.feed(Message(4, 500_000_000 - older, robot.right, (0.1,) * 6).cdr())
     assert robot.input.counts == ({'time_jump': 1} if older else {})
     assert bool(robot.input.known_joints(LEFT)) is not bool(older)
-
-
-def test_strangers_messages_do_not_move_time(robot):
-    robot.send(0, robot.both)
-    assert robot.ready(10**8, ['wheel']) == []
-    assert robot.ready(1, robot.left) == [LEFT]
-    assert robot.input.counts == {}
 
 
 def test_velocities_come_along_if_all_are_there(robot):

@@ -4,7 +4,7 @@ from collections import Counter
 
 from icub_leg_fk.kinematics import Catalog
 from icub_leg_fk.ros.joint_input import ChainCounts, JointInput
-from icub_leg_fk.ros.signs_of_life import JOINT_STATE, Second, SignsOfLife
+from icub_leg_fk.ros.signs_of_life import JOINT_STATE, Second, SignsOfLife, ThrottledWarnings
 from joint_model import Message
 import pytest
 
@@ -138,3 +138,19 @@ def test_what_is_published_is_said_at_once_and_a_change_with_the_next_second(nod
     assert node.seconds(3, ready=0) == ['info: publishing d']
     node.signs.configured(['publishing d'], ['doubtful'])
     assert node.seconds(3, ready=0) == []
+
+
+def test_warnings_of_one_reason_are_heard_at_once_and_then_every_five_seconds(monkeypatch):
+    now, heard = [100.0], []
+    monkeypatch.setattr('time.monotonic', lambda: now[0])
+    warn = ThrottledWarnings(heard.append)
+    for _ in range(3):
+        warn('stale_joint', 'l_knee')
+        warn('malformed', 'name')
+    assert heard == ['stale_joint: l_knee', 'malformed: name']
+    for elapsed, more in ((4.9, []), (0.2, ['stale_joint: l_knee (and 3 more)']),
+                          (5.1, ['stale_joint: l_knee'])):
+        heard.clear()
+        now[0] += elapsed
+        warn('stale_joint', 'l_knee')
+        assert heard == more

@@ -10,8 +10,7 @@ from icub_leg_fk.ros.joint_input import JointInput
 from icub_leg_fk.ros.outputs import Outputs
 from icub_leg_fk.ros.parameters import NodeParameters
 from icub_leg_fk.ros.qos_overrides import OVERRIDABLE
-from icub_leg_fk.ros.signs_of_life import SignsOfLife
-from icub_leg_fk.ros.throttle import ThrottledWarnings
+from icub_leg_fk.ros.signs_of_life import SignsOfLife, ThrottledWarnings
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data

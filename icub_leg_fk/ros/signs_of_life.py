@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import re
+import time
 from typing import Any
 
 from icub_leg_fk.kinematics import Chain
@@ -14,6 +15,7 @@ from icub_leg_fk.ros.joint_input import ChainCounts
 PATIENCE = 5  # s without what is expected, before it is worth a warning
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 _NAMES_SHOWN = 12
+_PERIOD = 5.0  # s between two warnings for one reason
 
 _Lines = tuple[tuple[str, ...], tuple[str, ...]]  # to be known, to be warned of
 
@@ -143,6 +145,29 @@ class SignsOfLife:
         if self._seconds[key] >= patience and key not in self._said:
             self._said.add(key)
             self._logger.warning(text())
+
+
+class ThrottledWarnings:
+    """Passes on at most one warning per reason and period, and says how many it held back.
+
+    Args:
+        warn: called with the text of a warning.
+    """
+
+    def __init__(self, warn: Callable[[str], object]) -> None:
+        self._warn = warn
+        self._last: dict[str, float] = {}
+        self._held_back: dict[str, int] = {}
+
+    def __call__(self, reason: str, text: str) -> None:
+        """Warn, unless this reason has been warned about a moment ago."""
+        now = time.monotonic()
+        if now - self._last.get(reason, -_PERIOD) < _PERIOD:
+            self._held_back[reason] = self._held_back.get(reason, 0) + 1
+            return
+        self._last[reason] = now
+        more = self._held_back.pop(reason, 0)
+        self._warn(f'{reason}: {text}' + (f' (and {more} more)' if more else ''))
 
 
 def _near(chain: Chain, names: Sequence[str]) -> str:
