@@ -72,18 +72,16 @@ def decode(node: Node) -> None:
     """Receive bytes, make joint vectors of them by the rules, send ready-made bytes."""
     from icub_leg_fk.kinematics import Catalog
     from icub_leg_fk.ros.joint_input import JointInput
-    from icub_leg_fk.ros.joint_stream import JointStream
     catalog = Catalog.load(None)
     chains = [catalog.chain(name, 'v2_5', 'dh') for name in ('left_leg', 'right_leg')]
-    stream = JointStream(JointInput(chains, 0.5), time.time_ns)
-
+    feed = JointInput(chains, 0.5, time.time_ns).feed
+    sends = [publisher.handle.publish_raw for publisher in _publishers(node)]
     ready = _ready_made()
 
-    def step(publisher: Any) -> Callable[..., None]:
-        send = publisher.handle.publish_raw
-        return lambda sec, nanosec, q, qdot: send(ready)
-    stream.on_ready = [step(publisher) for publisher in _publishers(node)]
-    _spin_as_ours(node, stream.feed)
+    def answer(data: bytes) -> None:
+        for vector in feed(data):
+            sends[vector.chain](ready)
+    _spin_as_ours(node, answer)
 
 
 def bare(node: Node) -> None:

@@ -280,7 +280,7 @@ def test_no_color_is_respected():
 ])
 def test_bad_input_is_one_line_and_exit_2(capsys, words, named):
     names = [name for leg in ('left_leg', 'right_leg')
-             for name in Catalog.load().entry(leg).joint_names]
+             for name in Catalog.load().chain(leg, 'v2_5').joint_names]
     file = write_csv(Path('bad.csv'), [0.0, 0.1], names, np.zeros((2, 12)))
     lines = file.read_text().splitlines()
     cells = lines[2].split(',')

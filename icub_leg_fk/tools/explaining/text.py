@@ -204,8 +204,8 @@ def _x_axes(e: Explanation) -> Lines:
                                      for i in range(len(e.steps))]
     if e.chain.convention == 'modified':
         remarks = [f'orthogonal to z_{i} and z_{i + 1}' for i in range(len(e.steps))] + ['free']
-    return [f'Step 3. The x axis of each frame, orthogonal to z_i and the z axis '
-            f'{"behind" if e.chain.convention == "modified" else "before"} it',
+    other = 'z_(i+1)' if e.chain.convention == 'modified' else 'z_(i-1)'
+    return [f'Step 3. The x axis of each frame, orthogonal to {other} and z_i',
             *_frame_table(e, 'x', 0, remarks)]
 
 
