@@ -7,6 +7,7 @@ from node_harness import BOTH, FEET, LOSSLESS, NodeProcess, Robot, SECOND
 from node_oracle import oracle_jacobian, oracle_pose, pose_matrix
 import numpy as np
 import pytest
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from recorded_walk import needs_recorded_walk, read_recorded_walk
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -221,6 +222,9 @@ def test_transforms_are_those_of_the_poses(foot_frame, children):
                           for message in inbox for transform in message.transforms})
             return len(found) >= 2
         robot.until(both_transforms, 'transforms')
+        qos = robot.node.get_publishers_info_by_topic('/tf')[0].qos_profile
+        assert (qos.reliability, qos.durability) == (
+            ReliabilityPolicy.RELIABLE, DurabilityPolicy.VOLATILE)
         for child, (chain, part) in zip(children, CHAINS.values(), strict=True):
             transform = found[f'x/{child}']
             assert transform.header.frame_id == 'x/root_link'

@@ -15,6 +15,7 @@ from icub_leg_fk.ros.joint_input import ChainCounts
 PATIENCE = 5  # s without what is expected, before it is worth a warning
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 _NAMES_SHOWN = 12
+_LONGEST_NEAR = 100  # characters of a name that may be meant for a joint's
 _PERIOD = 5.0  # s between two warnings for one reason
 
 _Lines = tuple[tuple[str, ...], tuple[str, ...]]  # to be known, to be warned of
@@ -172,7 +173,7 @@ class ThrottledWarnings:
 
 def _near(chain: Chain, names: Sequence[str]) -> str:
     """Say which name is a chain's but for capitals, or what stands before or behind it."""
-    for name in names:
+    for name in (name for name in names if len(name) <= _LONGEST_NEAR):
         for joint in chain.joint_names:
             if re.fullmatch(rf'(.*[^a-z0-9])?{re.escape(joint)}([^a-z0-9].*)?', name,
                             re.IGNORECASE | re.DOTALL):
