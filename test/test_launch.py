@@ -9,7 +9,10 @@ import threading
 import pytest
 
 LAUNCH_FILE = Path(__file__).resolve().parents[1] / 'launch/foot_poses_launch.py'
-ARGUMENTS = {'version', 'chains', 'params_file', 'namespace', 'use_sim_time'}
+ARGUMENTS = {
+    'version', 'chains', 'kinematics_file', 'foot_frame', 'frame_prefix', 'publish_tf',
+    'publish_twist', 'publish_markers', 'use_sim_time', 'params_file', 'namespace', 'log_level',
+    'rviz'}
 TIMEOUT = 90  # s
 
 # What `ros2 launch FILE NAME:=VALUE ...` does, without ros2cli.
@@ -80,12 +83,37 @@ def test_chains_is_a_list(needs_launch: None) -> None:
 
 
 @pytest.mark.parametrize('argument', [
-    'chains:=left_leg', 'use_sim_time:=maybe', 'params_file:=/no/such/file.yaml'])
+    'chains:=left_leg', 'chains:=[left_leg,]', 'use_sim_time:=maybe', 'publish_tf:=perhaps',
+    'params_file:=/no/such/file.yaml', 'log_level:=loud', 'rviz:=please'])
 def test_a_bad_argument_is_named_in_one_line(needs_launch: None, argument: str) -> None:
     name, value = argument.split(':=')
     complaints = [line for line in output_of(argument).splitlines() if 'ERROR' in line]
     assert len(complaints) == 1
     assert f'argument {name}: found {value!r}' in complaints[0]
+
+
+def test_an_argument_that_is_nearly_one_of_ours_is_refused(needs_launch: None) -> None:
+    assert "unknown argument 'verson'; did you mean 'version'?" in output_of('verson:=v1')
+
+
+@pytest.mark.parametrize(('argument', 'told'), [
+    ('kinematics_file:=/no/such.yaml', '/no/such.yaml'), ('foot_frame:=toe', "'toe'"),
+    ('frame_prefix:=/icub1/', "'/icub1/'")])
+def test_the_arguments_reach_the_node(needs_launch: None, argument: str, told: str) -> None:
+    assert f'found {told}' in output_of(argument) or told in output_of(argument)
+
+
+def test_rviz_gets_the_shipped_configuration_in_namespace_and_prefix(needs_launch: None) -> None:
+    from importlib.util import module_from_spec, spec_from_file_location
+    spec = spec_from_file_location('foot_poses_launch', LAUNCH_FILE)
+    assert spec is not None and spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    command = ' '.join(str(part) for part in module.viewer('robot1', 'icub1/')._Node__arguments)
+    assert 'foot_poses.rviz' in command and '-f icub1/root_link' in command
+    shown = (LAUNCH_FILE.parents[1] / 'config' / 'foot_poses.rviz').read_text()
+    for topic in module.RVIZ_TOPICS:
+        assert f'Value: {topic}\n' in shown
 
 
 def test_without_arguments_the_node_runs_until_sigint_and_ends_cleanly(
