@@ -26,6 +26,8 @@ from bag_files import (
     walk,
     write_bag,
 )
+from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.tools import recording
 from icub_leg_fk.tools.bag import add_foot_poses
 from leg_fk_process import assert_one_line_complaint, leg_fk
 import numpy as np
@@ -376,6 +378,7 @@ def test_a_users_own_kinematics_file(tmp_path):
     assert len(poses_of(read_bag(tmp_path / 'out')[1], LEFT_POSE)) == 5
 
 
+LEG_CHAINS = [Catalog.load().chain(name, 'v2_5') for name in ('left_leg', 'right_leg')]
 RECORDINGS = Path(__file__).resolve().parents[2] / 'shared' / 'data' / 'rosbag2_jazzy'
 WHOLE = sorted(path.name for path in RECORDINGS.glob('*') if (path / 'metadata.yaml').is_file())
 
@@ -391,6 +394,8 @@ def test_recordings_of_rosbag2_are_taken_message_for_message(tmp_path):
                   if entry['topic_metadata']['name'] == '/joint_states')
         assert (summary.copied, summary.joint_states) == (information['message_count'], count)
         assert summary.added == {LEFT_POSE: count, RIGHT_POSE: count}
+        found = recording.read_bag(RECORDINGS / name, LEG_CHAINS, None)  # as leg_fk plot reads it
+        assert [len(track.times) for track in found.tracks] == [count, count]
         topics, messages = read_bag(RECORDINGS / name)
         new_topics, new_messages = read_bag(tmp_path / name)
         assert {topic: new_topics[topic] for topic in topics} == topics
