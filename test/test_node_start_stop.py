@@ -40,7 +40,13 @@ BAD = {
     '-p kinematics_file:=/no/such.yaml': ['/no/such.yaml'],
     '-p kinematics_file:=/': ['/', 'directory'],
     '-p kinematics_file:=true': ['kinematics_file', 'True'],
-    '-p verson:=v1': ['verson', 'version'],
+    '-p verson:=v1': ["unknown parameter 'verson'; did you mean 'version'?"],
+    '-p left_leg.verson:=v1': ["did you mean 'left_leg.version'?"],
+    '-p publish_twsit:=true': ["did you mean 'publish_twist'?"],
+    '-- version:=v1': ["'version:=v1'", 'did you mean --ros-args -p version:=v1?'],
+    '-- _version:=v1': ["'_version:=v1'", 'did you mean --ros-args -p version:=v1?'],
+    '-- joint_states:=/x': ['did you mean --ros-args -r joint_states:=/x?'],
+    '-- __node:=x': ['did you mean --ros-args -r __node:=x?'],
     '-p use_sim_time:=5': ['use_sim_time', '5', 'BOOL'],
     f'-p {QOS}reliability:=sure': ['reliability', "'sure'", 'reliable or best_effort'],
     f'-p {QOS}depth:=-4': ['depth', '-4', '1'],
@@ -79,6 +85,51 @@ def test_bad_argument_ends_in_one_line_and_exit_code_one(runs, arguments):
     assert done.stderr.count('\n') == 1
     for word in BAD[arguments]:
         assert word in done.stderr
+
+
+def test_assignment_before_ros_args_is_refused():
+    done = subprocess.run(
+        [sys.executable, '-m', 'icub_leg_fk.ros.main', 'version:=v1', '--ros-args', '-p',
+         'foot_frame:=sole'], capture_output=True, text=True, timeout=300, check=False)
+    assert (done.returncode, done.stdout) == (1, '')
+    assert done.stderr == ("foot_pose_publisher: error: unknown argument 'version:=v1'; "
+                           'did you mean --ros-args -p version:=v1?\n')
+
+
+def test_parameters_of_other_nodes_are_passed_over_and_named_once(tmp_path):
+    file = tmp_path / 'all_nodes.yaml'
+    file.write_text('/**:\n  ros__parameters:\n    robot_description: <robot/>\n'
+                    '    publish_rate: 50.0\n    version: v1\n')
+    with NodeProcess(arguments=['--params-file', str(file)]) as node:
+        node.wait_for_log('(left_leg v1,')
+        [warning] = [line for line in node.log().splitlines() if '[WARN]' in line]
+        assert warning.endswith('of this node: robot_description, publish_rate')
+
+
+def test_what_rcl_warns_of_is_shown():
+    with NodeProcess(arguments=['--log-level', 'rcl:=debug']) as node:
+        node.wait_for_log('publishing')
+        assert '[rcl]' in node.log()
+
+
+@pytest.mark.parametrize('setting', ['RCUTILS_COLORIZED_OUTPUT', 'RCUTILS_LOGGING_USE_STDOUT',
+                                     'RCUTILS_LOGGING_BUFFERED_STREAM'])
+def test_bad_settings_of_the_log_do_not_keep_it_from_working(setting):
+    with NodeProcess(environment={setting: 'true'}) as node, Robot(node) as robot:
+        robot.connect()
+
+
+def test_loopback_that_is_down_is_told_with_what_mends_it():
+    without_loopback = ['unshare', '--map-root-user', '--net']
+    if subprocess.run([*without_loopback, 'true'], capture_output=True, check=False).returncode:
+        pytest.skip('no network namespace can be made here')
+    with subprocess.Popen([*without_loopback, sys.executable, '-m', 'icub_leg_fk.ros.main'],
+                          stderr=subprocess.PIPE, text=True) as node:
+        said = next(line for line in node.stderr
+                    if 'loopback' in line or 'no JointState' in line)  # the next to be said
+        node.terminate()
+        assert node.wait(DEADLINE) == 0
+    assert said.endswith('this brings it up: sudo ip link set lo up\n')
 
 
 def test_transforms_without_tf2_msgs_are_refused_in_one_line():

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 import os
 import re
 import signal
+import socket
 import sys
+import tempfile
 from types import FrameType
 from typing import Any
 
@@ -68,7 +72,6 @@ def _run(stop: _StopSignals, argv: list[str]) -> int:
         return 0
     try:
         import rclpy
-        from rclpy.logging import LoggingSeverity, set_logger_level
         from rclpy.signals import SignalHandlerOptions
         from rclpy.task import Future
         from rclpy.utilities import remove_ros_args
@@ -77,22 +80,28 @@ def _run(stop: _StopSignals, argv: list[str]) -> int:
                        'icub_leg_fk[ros]')
     from icub_leg_fk.errors import LegFKError
     from icub_leg_fk.ros.foot_pose_publisher import FootPosePublisher, START_ERRORS
-    set_logger_level('rcl', LoggingSeverity.FATAL)  # what rcl would log comes as an exception
+    if assignment := _bare_assignment(argv[1:]):
+        return _refuse(assignment)
     try:
-        rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
+        with _stderr_unless_it_raises():
+            rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
         if others := remove_ros_args(argv)[1:]:
             return _refuse(f'unknown argument {others[0]!r}; parameters go behind --ros-args')
     except RuntimeError as error:  # rclpy's errors for arguments it cannot parse
         unknown = type(error).__name__ == 'UnknownROSArgsError'
         return _refuse(f'unknown argument {error} behind --ros-args' if unknown else str(error))
-    set_logger_level('rcl', LoggingSeverity.UNSET)
     stop.started()
     try:
         executor = _executor()
         try:
-            executor.add_node(FootPosePublisher())
+            node = FootPosePublisher()
         except (LegFKError, *START_ERRORS) as error:
             return _refuse(str(error))
+        if not _loopback_is_up():
+            node.get_logger().warning(
+                'the loopback interface is down, over which ROS nodes of one machine find each '
+                'other; this brings it up: sudo ip link set lo up')
+        executor.add_node(node)
         while rclpy.ok() and not stop.requested:
             # Unlike spin_once, this takes message after message without coming back in between.
             executor.spin_until_future_complete(Future(), timeout_sec=_SPIN_PERIOD)
@@ -101,10 +110,50 @@ def _run(stop: _StopSignals, argv: list[str]) -> int:
     return 0
 
 
+def _bare_assignment(arguments: Sequence[str]) -> str | None:
+    """Say how to write an assignment outside of --ros-args, which rcl takes for a remapping."""
+    from icub_leg_fk.ros.parameters import is_parameter_name
+    behind_ros_args = False
+    for argument in arguments:
+        if argument in ('--ros-args', '--'):
+            behind_ros_args = argument == '--ros-args'
+        elif not behind_ros_args and ':=' in argument:
+            name, _, value = argument.partition(':=')
+            parameter = name.removeprefix('_')
+            meant = (f'-p {parameter}' if is_parameter_name(parameter) else f'-r {name}')
+            return f'unknown argument {argument!r}; did you mean --ros-args {meant}:={value}?'
+    return None
+
+
+@contextmanager
+def _stderr_unless_it_raises() -> Iterator[None]:
+    """Let what C writes to stderr pass, but for the report of an error that is raised as well."""
+    sys.stderr.flush()
+    stderr = os.dup(2)
+    with tempfile.TemporaryFile() as written:
+        os.dup2(written.fileno(), 2)
+        try:
+            yield
+        except BaseException:
+            written.truncate(0)
+            raise
+        finally:
+            os.dup2(stderr, 2)
+            os.close(stderr)
+            written.seek(0)
+            while block := written.read(65536):
+                os.write(2, block)
+
+
 def _refuse(reason: str) -> int:
     line = re.sub(r',? at \S+:\d+', '', ' '.join(reason.split()))  # where in rcl's sources
     print(f'foot_pose_publisher: error: {line}', file=sys.stderr)
     return 1
+
+
+def _loopback_is_up() -> bool:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        return probe.connect_ex(('127.0.0.1', 9)) == 0  # sends nothing
 
 
 def _executor() -> Any:

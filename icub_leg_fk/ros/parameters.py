@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from icub_leg_fk.errors import LegFKError, ParameterError
+from icub_leg_fk.errors import LegFKError, near, ParameterError
 from icub_leg_fk.kinematics import Catalog
 from icub_leg_fk.ros.configuration import (
     Configuration,
@@ -62,7 +62,17 @@ _PARAMETERS = (
     _Parameter('publish_twist', False, 'Also publish the velocity of the tips.'),
     _Parameter('publish_markers', False, 'Also publish the skeletons for RViz and Foxglove.'),
 )
-_FOREIGN = ('use_sim_time', 'start_type_description_service')
+_RCLPYS_OWN = ('use_sim_time', 'start_type_description_service')
+_COMMON_ELSEWHERE = ('frame_id', 'root_frame', 'base_frame', 'tf_prefix', 'publish_rate',
+                     'robot_description', 'joints')
+"""Names that other nodes have: in a file for all nodes they are theirs, not ours misspelt."""
+
+
+def is_parameter_name(name: str) -> bool:
+    """Return whether this is the name of a parameter of the node, or nearly so."""
+    names = [parameter.name for parameter in _PARAMETERS]
+    return (name in (*names, *_RCLPYS_OWN) or name.endswith('.version') or
+            name.startswith(PREFIX) or near(name, names) is not None)
 
 
 class NodeParameters:
@@ -89,7 +99,7 @@ class NodeParameters:
         self._catalog = Catalog.load(node.get_parameter('kinematics_file').value)
         for parameter in self._version_parameters():
             self._declare(parameter)
-        self._refuse_unknown()
+        self._check_overrides()
         self.configuration = Configuration.from_parameters(self._values(), self._catalog)
         self._declaring = False
         self._candidate: tuple[Catalog, Configuration] | None = None
@@ -130,21 +140,30 @@ class NodeParameters:
                                              ignore_override=True)
         self._declaring = False
 
-    def _refuse_unknown(self) -> None:
-        """Refuse overrides that name no parameter, which rclpy would pass over in silence."""
+    def _check_overrides(self) -> None:
+        """Refuse overrides that rclpy would pass over in silence: misspelt ones and bad QoS.
+
+        A file for all nodes holds other nodes' parameters, too; that they are passed over is said.
+        """
         known = [*(parameter.name for parameter in _PARAMETERS),
-                 *map(version_parameter, self._catalog.chains), *_FOREIGN]
+                 *map(version_parameter, self._catalog.chains), *_RCLPYS_OWN]
         resolve = self._node.resolve_topic_name
         roles = {resolve('joint_states'): 'subscription'}
         roles |= {resolve(f'~/{entry.tip}/{kind}'): 'publisher'
                   for entry in self._catalog.chains.values() for kind in ('pose', 'twist')}
         roles[resolve('~/skeleton')] = 'publisher'
+        foreign = []
         for name, override in self._node._parameter_overrides.items():
             if name.startswith(PREFIX):
                 check_qos_override(name, override.value, roles)
             elif name not in known:
-                raise ParameterError(f'parameter {name}: found no such parameter, allowed: '
-                                     f'{", ".join(known)}')
+                if name not in _COMMON_ELSEWHERE and (guess := near(name, known)):
+                    raise ParameterError(
+                        f'unknown parameter {name!r}; did you mean {guess!r}?')
+                foreign.append(name)
+        if foreign:
+            self._node.get_logger().warning(
+                f'passed over parameters that are not of this node: {", ".join(foreign)}')
 
     def _values(self) -> dict[str, Any]:
         names = [*(parameter.name for parameter in _PARAMETERS),
