@@ -170,6 +170,7 @@ def test_any_robot_can_be_read_in_metres_and_radians(tmp_path: Path) -> None:
         (0, 10, pi / 2, pi / 2), (0.5, -2, 0, 0), (0, 0.25, 0, 0)]
     assert [(link.joint_type, link.lower, link.upper) for link in chain.joints] == [
         ('revolute', -float('inf'), float('inf')), ('prismatic', -3, 4)]
+    assert chain.out_of_range([9.0, 4.1]) == ('trolley',)
     # x = d of the trolley and the fixed row, y = a, z = mast and d of the slew.
     assert chain.forward([0, 3])[:3, 3] == pytest.approx((1.25, 0.5, 12.5), abs=1e-15)
 

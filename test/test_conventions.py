@@ -155,8 +155,8 @@ def test_what_can_hardly_be_meant_is_computed_and_said(arm: Path,
                                                        capsys: pytest.CaptureFixture) -> None:
     rotation, length, angle = Catalog.load(arm).warnings
     assert f'{arm}:8: chain arm, field tip_frames, pad, field transform: the rot' in rotation
-    assert f'{arm}:23: chain arm, version v2, row 1, field a: 250 m is hardly meant' in length
-    assert f'{arm}:23: chain arm, version v2, row 1, field alpha: 90 rad is hardly me' in angle
+    assert f'{arm}:23: chain arm, version v2, row 1, field a: 250 m is unlikely' in length
+    assert f'{arm}:23: chain arm, version v2, row 1, field alpha: 90 rad is unlike' in angle
     R = Catalog.load(arm).chain('arm', 'v1', 'pad').forward([0, 0])[:3, :3]
     assert np.abs(R @ R.T - np.eye(3)).max() < 1e-15
     with pytest.warns(UserWarning, match='the rotation is rounded'):
@@ -167,7 +167,7 @@ def test_what_can_hardly_be_meant_is_computed_and_said(arm: Path,
 
 def test_three_decimals_are_too_few_for_a_rotation(arm: Path) -> None:
     arm.write_text(ARM.replace('0.7071', '0.707'))
-    with pytest.raises(CatalogError, match=r'no rigid transform.*four decimals'):
+    with pytest.raises(CatalogError, match=r'not a rigid transform.*four decimals'):
         Catalog.load(arm)
 
 

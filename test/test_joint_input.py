@@ -3,10 +3,9 @@
 import math
 import tracemalloc
 
-from icub_leg_fk.kinematics import Catalog, Chain, DHLink
+from icub_leg_fk.kinematics import Catalog
 from icub_leg_fk.ros.joint_input import JointInput
 from joint_model import Message
-import numpy as np
 import pytest
 
 LEFT, RIGHT = 0, 1
@@ -116,17 +115,6 @@ def test_an_angle_that_is_not_finite_holds_back_just_its_chain(robot, value):
     assert robot.ready(2, ['l_knee']) == [LEFT]
 
 
-@pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf, 1e150, -1e150])
-def test_an_angle_that_is_not_finite_is_refused_where_there_is_no_range_too(value):
-    link = DHLink(a=0.1, d=0.0, alpha=0.0)
-    chain = Chain(name='arm', version='a', root_frame='base', tip='hand', tip_frame='hand',
-                  joint_names=('turn',), links=(link,), T_root_0=np.eye(4), T_n_tip=np.eye(4))
-    joint_input = JointInput([chain], 0.5, lambda: START)
-    assert joint_input.feed(joint_state(0, ['turn'], [value])) == []
-    assert joint_input.counts == {}
-    assert joint_input.chain_counts[0].joints == {'non_finite': {'turn': str(value)}}
-
-
 def test_out_of_range_goes_out_as_it_is_and_is_noted(robot):
     [vector] = robot.send(0, robot.left, [0.0, 0.0, 0.0, 9.0, 0.0, -8.0])
     assert vector.positions == (0.0, 0.0, 0.0, 9.0, 0.0, -8.0)
@@ -142,35 +130,6 @@ def test_a_looping_bag_goes_on_with_the_very_message_and_says_so_once(robot):
     assert [reason for reason, _ in robot.reports] == ['time_jump'] * 2
     assert robot.reports[0][1] == (
         'time stepped back to 1700000000.000 s; held joints are forgotten')
-
-
-@pytest.mark.parametrize('older', [0, 1])
-def test_a_joint_older_than_what_is_held_of_it_is_a_step_back(robot, older):
-    for nanosec in (10, 10 - older):
-        ready = robot.input.feed(Message(5, nanosec, robot.left, (0.1,) * 6).cdr())
-    assert len(ready) == 1
-    assert robot.input.counts == ({'time_jump': 1} if older else {})
-
-
-@pytest.mark.parametrize('older', [0, 1])
-def test_a_message_older_than_anything_held_by_more_than_the_timeout_is_a_step_back(robot, older):
-    robot.input.feed(Message(5, 0, robot.left, (0.1,) * 6).cdr())
-    assert robot.input.feed(Message(4, 500_000_000 - older, robot.right, (0.1,) * 6).cdr())
-    assert robot.input.counts == ({'time_jump': 1} if older else {})
-    assert bool(robot.input.known_joints(LEFT)) is not bool(older)
-
-
-def test_velocities_come_along_if_all_are_there(robot):
-    [vector] = robot.send(0, robot.left, [0.1] * 6, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
-    assert vector.velocities == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
-
-
-@pytest.mark.parametrize('velocities', [(), (1.0,) * 5, (1.0,) * 5 + (math.nan,),
-                                        (math.inf,) + (1.0,) * 5])
-def test_velocities_that_are_absent_short_or_not_finite_are_none(robot, velocities):
-    robot.send(0, robot.left, [0.1] * 6, [1.0] * 6)
-    [vector] = robot.send(1, robot.left, [0.1] * 6, velocities)
-    assert vector.velocities is None
 
 
 def test_velocities_that_nobody_wants_are_none_and_none_are_known_when_they_are_wanted_again():
@@ -217,26 +176,12 @@ def test_joints_that_are_not_taken_over_do_not_move_time():
     assert successor.counts == {}
 
 
-def test_padding_may_hold_anything_and_change_every_time(robot):
-    for ms, padding in enumerate((0, 0xa5, 0, 0xff, 0x5a)):
-        data = joint_state(ms, [*robot.both, 'odd'], [0.1] * 13, [1.0] * 13, padding=padding)
-        assert [vector.chain for vector in robot.input.feed(data)] == [LEFT, RIGHT]
-
-
 def test_big_endian_messages_are_read_and_equal_bytes_in_another_order_are_told_apart(robot):
     data = joint_state(0, robot.left, [0.1] * 6, order='>')
     [vector] = robot.input.feed(data)
     assert vector.positions == (0.1,) * 6
     assert robot.input.feed(b'\x00\x01' + data[2:]) == []
     assert robot.reported()[0] == 'malformed'
-
-
-def test_a_zero_stamp_becomes_now(robot):
-    for sec, nanosec, stamp in ((0, 0, START), (0, 5, 5)):
-        robot = Robot()
-        data = Message(sec, nanosec, robot.left, (0.1,) * 6).cdr()
-        [vector] = robot.input.feed(data)
-        assert vector.sec * 1_000_000_000 + vector.nanosec == stamp
 
 
 def test_degrees_for_radians_are_noted(robot):

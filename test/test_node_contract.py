@@ -43,16 +43,6 @@ def expected(chain, names, version='v2_5', foot_frame='dh'):
     return oracle_pose(chain, version, [ANGLES[name] for name in names], foot_frame)
 
 
-@pytest.mark.parametrize('names', [
-    BOTH, BOTH[::-1], RIGHT + LEFT, ('torso_yaw', *BOTH[::2], 'gripper', *BOTH[1::2], 'l_knee_2'),
-], ids=['in order', 'reversed', 'right first', 'mixed with others'])
-def test_joints_are_matched_by_name(robot, names):
-    stamp = robot.connect() + SECOND
-    send_angles(robot, stamp, names)
-    assert_same_pose(robot.take(robot.left, stamp)[-1], expected('left_leg', LEFT))
-    assert_same_pose(robot.take(robot.right, stamp)[-1], expected('right_leg', RIGHT))
-
-
 def test_names_that_change_between_messages_are_picked_up_at_once(robot):
     start = robot.connect() + SECOND
     orders = [BOTH, RIGHT + LEFT, BOTH[::-1], ('a', *BOTH), BOTH, ('bb', *BOTH[::-1])]
@@ -72,15 +62,6 @@ def test_pose_has_the_stamp_of_its_message_and_the_frame_of_the_root(robot):
         q = pose.pose.orientation
         assert q.w >= 0
         assert np.isclose(np.linalg.norm([q.x, q.y, q.z, q.w]), 1.0, rtol=0, atol=1e-15)
-
-
-def test_one_message_gives_one_pose_per_foot(robot):
-    stamp = robot.connect()
-    for i in range(1, 6):
-        send_angles(robot, stamp + i, BOTH)
-        for foot in FEET:
-            robot.wait_for(robot.poses[foot], stamp + i)
-    assert robot.left.stamps() == robot.right.stamps() == [stamp + i for i in range(1, 6)]
 
 
 def endpoints(robot, topic, kind):
@@ -194,14 +175,6 @@ def test_shipped_parameter_file_is_taken_and_holds_the_defaults(default_robot):
         assert other.result(other.parameters().get_parameters(names)).values == defaults
         own = other.result(other.parameters().get_parameters(['head_imu.version'])).values
         assert own[0].string_value == 'v2'
-
-
-def test_stamp_can_be_the_time_of_the_node():
-    with NodeProcess({'stamp_source': 'now'}) as node, Robot(node) as robot:
-        before = robot.node.get_clock().now().nanoseconds
-        robot.until(lambda: robot.send(SECOND) or robot.left, 'a pose')
-        now = robot.node.get_clock().now().nanoseconds
-        assert before <= robot.left.stamps()[0] <= now
 
 
 def test_help_is_shown_without_a_node():

@@ -97,28 +97,9 @@ def test_other_joints_and_all_other_fields_are_nobodys_business(robot):
     robot.take(robot.right, t + 1)
 
 
-def test_leg_with_a_joint_never_seen_waits_for_it(robot):
-    robot.start += 10 * SECOND
-    t = robot.connect(start=robot.start) - 5 * SECOND  # time steps back: nothing is held
-    names = [name for name in BOTH if name != 'l_knee']
-    robot.send(t, names, [Q[BOTH.index(name)] for name in names])
-    robot.send(t + 1, ['l_knee'], [-0.4])
-    poses = robot.take(robot.left, t + 1)
-    assert poses.stamps() == [t + 1]
-    check_left(poses[0], [*Q[:3], -0.4, *Q[4:6]], t + 1)
-    assert robot.take(robot.right, t).stamps() == [t]
-
-
 @pytest.mark.parametrize('names, positions', [
-    (BOTH, Q[:11]),
-    (BOTH, Q[:1]),
-    (BOTH, []),
-    ((), []),
-    ((), Q),
-    ((*BOTH, 'l_knee'), [*Q, 0.1]),
-    ((*BOTH, 'wheel', 'wheel'), [*Q, 0.1, 0.2]),
-], ids=['one position too few', 'one position', 'no position', 'nothing', 'no name',
-        'a joint twice', 'another name twice'])
+    (BOTH, Q[:11]), (BOTH, []), ((*BOTH, 'wheel', 'wheel'), [*Q, 0.1, 0.2]),
+], ids=['one position too few', 'no position', 'a duplicate name'])
 def test_message_is_refused_as_a_whole(robot, names, positions):
     t = robot.start + MS
     robot.send(t, names, positions)
@@ -128,7 +109,7 @@ def test_message_is_refused_as_a_whole(robot, names, positions):
     check_left(robot.take(robot.left, t + 2 * MS)[-1], Q[:6], t + 2 * MS)
 
 
-@pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf, 1e300])
+@pytest.mark.parametrize('value', [math.nan, -math.inf])
 def test_angle_that_is_no_number_holds_back_its_own_leg_until_it_is_one_again(robot, value):
     t = robot.start + MS
     robot.send(t, BOTH, [*Q[:3], value, *Q[4:]])
@@ -182,15 +163,6 @@ def test_empty_bytes_over_the_default_qos_are_dropped():
         t = robot.connect()
         robot.joints.publish(b'')
         robot.connect(t + SECOND)
-
-
-def test_names_that_are_no_text_are_nobodys_joints(robot):
-    t = robot.start + MS
-    message = JointState(name=['l_kneeX', *BOTH], position=[9.0, *Q])
-    message.header.stamp.sec, message.header.stamp.nanosec = divmod(t, SECOND)
-    robot.joints.publish(serialize_message(message).replace(b'l_kneeX', b'l_knee\xff'))
-    check_left(robot.take(robot.left, t)[0], Q[:6], t)
-    robot.take(robot.right, t)
 
 
 def test_two_publishers_on_one_topic_are_both_heard(robot):

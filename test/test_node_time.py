@@ -3,7 +3,7 @@
 from itertools import pairwise
 import time
 
-from node_harness import BOTH, DEEP, LEFT, LOSSLESS, NodeProcess, RIGHT, Robot, SECOND
+from node_harness import BOTH, DEEP, LEFT, LOSSLESS, NodeProcess, Robot, SECOND
 import pytest
 from rosgraph_msgs.msg import Clock
 
@@ -37,24 +37,6 @@ def test_zero_stamp_becomes_now(robot):
     robot.take(robot.right, robot.start)
 
 
-def test_joint_older_than_the_timeout_beside_its_newest_peer_holds_its_leg_back(robot):
-    t = robot.start
-    robot.send(t + HALF, LEFT[:5])  # the ankle's roll is now as old as allowed
-    robot.send(t + HALF + 1, LEFT[:5])  # and now older
-    robot.send(t + HALF + 2, RIGHT)
-    robot.send(t + HALF + 3, LEFT[5:])
-    assert robot.take(robot.left, t + HALF + 3).stamps() == [t + HALF, t + HALF + 3]
-    assert robot.take(robot.right, t + HALF + 2).stamps() == [t + HALF + 2]
-
-
-def test_other_chains_and_pauses_are_no_reason_to_hold_back(robot):
-    t = robot.start + 100 * SECOND
-    robot.send(t, LEFT)
-    robot.send(t + 200 * SECOND, RIGHT)  # long after every joint of the left leg
-    assert robot.take(robot.left, t).stamps() == [t]
-    assert robot.take(robot.right, t + 200 * SECOND).stamps() == [t + 200 * SECOND]
-
-
 def test_timeout_of_zero_is_none():
     with NodeProcess({'joint_timeout': 0.0, **LOSSLESS}) as node, Robot(node) as robot:
         t = robot.connect() + 3600 * SECOND
@@ -73,23 +55,6 @@ def test_looping_bag_gives_every_pose_in_every_loop_and_is_said_once():
         assert robot.left.stamps() == robot.right.stamps() == stamps * 4
         said = [line for line in node.log().splitlines() if 'time stepped back' in line]
         assert 1 <= len(said) <= 1 + (time.monotonic() - began) // 5  # again after 5 s
-
-
-def test_short_loop_within_the_timeout_is_noticed_too(robot):
-    stamps = [robot.start + i for i in range(1, 4)]
-    for stamp in stamps * 2:
-        robot.send(stamp)
-    robot.until(lambda: len(robot.left) == len(robot.right) == 6, 'all poses')
-    assert robot.right.stamps() == stamps * 2
-
-
-def test_joints_from_before_a_loop_are_not_mixed_with_those_after_it(robot):
-    t = robot.start - 100 * SECOND
-    robot.send(t, LEFT[:3])
-    robot.send(t + 1, RIGHT)
-    robot.send(t + 2, LEFT[3:])
-    assert robot.take(robot.left, t + 2).stamps() == [t + 2]
-    assert robot.take(robot.right, t + 1).stamps() == [t + 1]
 
 
 def test_stamps_beyond_time_are_harmless(robot):

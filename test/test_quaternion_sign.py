@@ -2,7 +2,7 @@
 
 from hypothesis import given
 from hypothesis import strategies as st
-from icub_leg_fk.kinematics import Catalog, Chain, matrix_to_quaternion
+from icub_leg_fk.kinematics import Catalog, Chain
 import numpy as np
 import pytest
 from recorded_walk import needs_recorded_walk, read_recorded_walk
@@ -35,18 +35,6 @@ def test_no_flip_on_the_recorded_walk(frame: str) -> None:
 def test_no_flip_of_a_standing_robot(chain: Chain) -> None:
     noise = np.random.default_rng(30).normal(0, np.radians(0.01), (10_000, chain.n))
     assert flips(chain, noise) == 0
-
-
-@every_chain
-def test_at_zero_w_is_positive_or_the_largest_component_is(chain: Chain) -> None:
-    quaternion = np.array(chain.pose([0.0] * chain.n)[3:])
-    expected = matrix_to_quaternion(chain.forward([0.0] * chain.n)[:3, :3])
-    assert np.abs(np.abs(quaternion) - np.abs(expected)).max() < 1e-14
-    if abs(quaternion[3]) > 1e-6:
-        assert quaternion[3] > 0
-    else:
-        assert quaternion[int(np.argmax(np.abs(quaternion[:3]) > np.abs(
-            quaternion[:3]).max() - 1e-6))] > 0
 
 
 @given(st.sampled_from(CHAINS), st.data())

@@ -243,7 +243,7 @@ class _Reader:
         for item in at.items('a list of joint names'):
             joint = item.name('a joint name')
             if joint in joints:
-                item.fail('each joint once', f'joint {joint} twice')
+                item.fail('each joint once', f'joint {joint} again')
             joints.append(joint)
         return tuple(joints)
 
@@ -292,7 +292,7 @@ class _Reader:
         if abs(length) > _LONGEST:
             at.fail(f'a length up to {_LONGEST:g} m')
         if abs(length) > _UNLIKELY:
-            self._warn(at, f'{length:g} m is hardly meant; the unit of length is {self._length}')
+            self._warn(at, f'{length:g} m is unlikely; the unit of length is {self._length}')
         return length
 
     def _radians(self, at: Field) -> float:
@@ -302,7 +302,7 @@ class _Reader:
         if self._angle == 'deg':
             return math.radians(value)
         if abs(value) > 2 * math.pi + 1e-3:
-            self._warn(at, f'{value:g} rad is hardly meant; the unit of angle is rad')
+            self._warn(at, f'{value:g} rad is unlikely; the unit of angle is rad')
         return value
 
     def _transform(self, at: Field) -> Array:
@@ -312,10 +312,10 @@ class _Reader:
             for i, row in enumerate(at.items('4 rows of 4 numbers', 4))])
         if not is_rigid_transform(T, _FOUR_DECIMALS):
             at.fail('a rotation (to four decimals at least), a translation and the last row '
-                    '0 0 0 1', 'a matrix that is no rigid transform')
+                    '0 0 0 1', 'a matrix that is not a rigid transform')
         mended = nearest_rotation(T[:3, :3])
         if (change := float(np.abs(mended - T[:3, :3]).max())) > _EXACT:
-            self._warn(at, f'the rotation is rounded; it is mended by up to {change:.1g} an entry')
+            self._warn(at, f'the rotation is rounded; corrected by up to {change:.1g} per entry')
         T[:3, :3] = mended
         return T
 

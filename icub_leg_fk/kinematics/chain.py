@@ -242,7 +242,7 @@ class Chain(Frozen):
         try:
             values = np.asarray(q)
         except (OverflowError, TypeError, ValueError) as error:
-            raise JointVectorError(f'{what} is no array of numbers ({error}); {shape} finite '
+            raise JointVectorError(f'{what} is not an array of numbers ({error}); {shape} finite '
                                    'numbers are allowed') from error
         if values.dtype.kind not in 'biuf' and values.size:
             raise JointVectorError(f'{what} is a {type(q).__name__} of {values.dtype.name}; '

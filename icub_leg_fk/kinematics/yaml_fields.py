@@ -89,7 +89,7 @@ class Field:
         for key, value in self.node.value:
             name = Field(self.file, self.where, key).name('a name', pattern)
             if name in fields:
-                Field(self.file, where(name), key).fail('each key once', 'the key twice')
+                Field(self.file, where(name), key).fail('each key once', 'a duplicate key')
             fields[name] = Field(self.file, where(name), value)
         return fields
 
@@ -184,7 +184,7 @@ def read_yaml(path: str | Path) -> Field:
         line = mark.line + 1 if mark else 0
         if 'nesting depth' in str(problem):  # libyaml looks ahead, and has a limit of its own
             _fail_too_deep(file, line)
-        found = f'text that is not YAML: {" ".join(str(problem).split())}'
+        found = f'text that is not YAML ({" ".join(str(problem).split())})'
         _fail(file, line, found, 'well-formed YAML')
     if node is None:
         _fail(file, 0, 'nothing', 'units and chains')

@@ -222,7 +222,7 @@ class _Reader:
         start = self.take(field, size)
         text = self._data[start:self._at]
         if size and text.find(0) != size - 1:
-            raise MalformedMessageError(f'JointState: {field} is no string that ends with NUL')
+            raise MalformedMessageError(f'JointState: {field} is not a string that ends with NUL')
         return text[:-1].decode('utf-8', 'replace')
 
     def doubles(self, field: str) -> Doubles:
