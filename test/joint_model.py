@@ -114,7 +114,7 @@ class JointModel:
         self.counts = Counter()
         self.ready = [0] * len(chains)
         self.held_back = [Counter() for _ in chains]
-        self.blamed = [set() for _ in chains]  # (reason, joint)
+        self.concerned = [set() for _ in chains]  # (reason, joint)
 
     def update(self, stamp, names, positions, velocities):
         """Return (chain, positions, velocities or None) for every chain that is ready."""
@@ -145,7 +145,7 @@ class JointModel:
                 self.ready[index] += 1
                 for joint, (lower, upper) in chain.items():
                     if self.held[joint].position < lower or self.held[joint].position > upper:
-                        self.blamed[index].add(('out_of_range', joint))
+                        self.concerned[index].add(('out_of_range', joint))
                 speeds = tuple(self.held[joint].velocity for joint in chain)
                 ready.append((index, tuple(self.held[joint].position for joint in chain),
                               speeds if all(-LARGEST < v < LARGEST for v in speeds) else None))
@@ -169,7 +169,7 @@ class JointModel:
                 faults.add(('stale_joint', joint))
             elif not -LARGEST < self.held[joint].position < LARGEST:
                 faults.add(('non_finite', joint))
-        self.blamed[index] |= faults
+        self.concerned[index] |= faults
         for reason in {reason for reason, _ in faults}:
             self.held_back[index][reason] += 1
         return not faults
@@ -182,4 +182,4 @@ class JointModel:
         """Start counting anew what is counted per chain."""
         self.ready = [0] * len(self.chains)
         self.held_back = [Counter() for _ in self.chains]
-        self.blamed = [set() for _ in self.chains]
+        self.concerned = [set() for _ in self.chains]

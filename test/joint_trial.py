@@ -76,7 +76,8 @@ class Trial:
             assert counts.ready == model.ready[index]
             assert counts.held_back == model.held_back[index]
             assert {(reason, joint) for reason, joints in counts.joints.items()
-                    for joint in joints if reason != 'looks_like_degrees'} == model.blamed[index]
+                    for joint in joints
+                    if reason != 'looks_like_degrees'} == model.concerned[index]
             assert self.input.known_joints(index) == {
                 joint: model.held[joint].stamp for joint in chain if joint in model.held}
         assert (self.input.messages, self.input.newest) == (model.messages, model.newest)

@@ -30,14 +30,14 @@ class Twists:
             self.send(Q, np.zeros(12))
             return all(self.inboxes.values())
         robot.until(answered, 'twists of both feet')
-        self.settle()
+        self.answers()
 
     def send(self, q, qdot, names=BOTH):
         self.stamp += MS
         self.robot.send(self.stamp, names, q, velocity=[float(value) for value in qdot])
         self.robot.spin(0.02)
 
-    def settle(self):
+    def answers(self):
         """Wait for the answers to the last message and empty all inboxes."""
         poses = {tip: self.robot.take(self.robot.poses[tip], self.stamp) for tip in FEET}
         return poses, {tip: self.robot.take(self.inboxes[tip], self.stamp) for tip in FEET}
@@ -63,7 +63,7 @@ def test_twist_is_the_jacobian_times_the_velocities(twists):
         q, qdot = random.uniform(-1, 1, 12), random.uniform(-5, 5, 12)
         order = random.permutation(12)
         twists.send(q[order], qdot[order], [BOTH[i] for i in order])
-        poses, answers = twists.settle()
+        poses, answers = twists.answers()
         for tip, (chain, part) in CHAINS.items():
             assert answers[tip].stamps() == poses[tip].stamps() == [twists.stamp]
             assert answers[tip][0].header.frame_id == 'root_link'
@@ -78,7 +78,7 @@ def test_no_twist_without_all_velocities_but_the_pose_goes_out(twists, qdot):
     twists.send(Q, qdot)
     bad = twists.stamp
     twists.send(Q, np.ones(12))
-    poses, answers = twists.settle()
+    poses, answers = twists.answers()
     for tip in FEET:
         assert poses[tip].stamps() == [bad, twists.stamp]
     whole = len(qdot) == 12
@@ -105,7 +105,7 @@ def check_against_differences(twists, positions, velocities, linear, angular):
     """
     for q, qdot in zip(positions, velocities, strict=True):
         twists.send(q, qdot)
-    poses, answers = twists.settle()
+    poses, answers = twists.answers()
     for tip in FEET:
         T = np.array([pose_matrix(message.pose) for message in poses[tip]])
         found = np.array([vector(message) for message in answers[tip]])
@@ -142,7 +142,7 @@ def test_frame_prefix_holds_for_twists_and_topics_go_when_they_are_switched_off(
     robot, node = twists.robot, twists.node
     assert robot.change(frame_prefix='a/').successful
     twists.send(Q, np.ones(12))
-    _, answers = twists.settle()
+    _, answers = twists.answers()
     assert answers['left_foot'][0].header.frame_id == 'a/root_link'
     topic = node.topic('left_foot/twist')
     robot.until(lambda: robot.node.count_publishers(topic) == 1, 'the twist topic')

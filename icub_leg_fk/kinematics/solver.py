@@ -66,7 +66,7 @@ class Solver:
         links: the rows, root to tip.
         T_root_0: (4, 4) transform from frame 0 to the root frame.
         T_n_tip: (4, 4) transform from the tip to the last row's frame.
-        R_zero: (3, 3) orientation of the tip at q = 0, which settles the quaternions' sign.
+        R_zero: (3, 3) orientation of the tip at q = 0, which decides the quaternions' sign.
     """
 
     def __init__(self, links: Sequence[DHLink], T_root_0: Array, T_n_tip: Array,

@@ -104,10 +104,10 @@ def _verdict(second: Second, counts: ChainCounts, missing: list[str]) -> tuple[b
     concerns = [f'{_WORDS[reason]}: {_listed(joints)}'
                 for reason, joints in sorted(counts.joints.items())]
     # An empty position is counted only, unless nothing else comes.
-    worth_telling = [f'{reason} {count}' for reason, count in sorted(second.rejected.items())
-                     if counts.ready == 0 or reason != 'empty_position']
-    if worth_telling:
-        concerns.append('messages: ' + ', '.join(worth_telling))
+    messages = [f'{reason} {count}' for reason, count in sorted(second.rejected.items())
+                if counts.ready == 0 or reason != 'empty_position']
+    if messages:
+        concerns.append('messages: ' + ', '.join(messages))
     if counts.ready == 0:
         if missing and 'missing_joint' not in counts.joints:
             concerns.insert(0, f'missing: {", ".join(missing)}; names that came: '
