@@ -4,18 +4,19 @@ import os
 from pathlib import Path
 import subprocess
 import sys
+from xml.etree import ElementTree
 import zlib
 
 from icub_leg_fk.kinematics import Catalog
 from icub_leg_fk.tools.gait import walk
 from icub_leg_fk.tools.leg_fk import main
-from icub_leg_fk.tools.plot import telling_instants
+from icub_leg_fk.tools.plot import default_instants
 from icub_leg_fk.tools.recording import ChainTrack
 import numpy as np
 import pytest
 
-over_time = pytest.importorskip('icub_leg_fk.tools.drawing.over_time', reason='needs matplotlib')
-pictures = pytest.importorskip('icub_leg_fk.tools.drawing.pictures', reason='needs matplotlib')
+pytest.importorskip('matplotlib')
+drawing = pytest.importorskip('icub_leg_fk.tools.drawing')
 
 JOINTS = [f'{side}_{joint}' for side in 'lr' for joint in (
     'hip_pitch', 'hip_roll', 'hip_yaw', 'knee', 'ankle_pitch', 'ankle_roll')]
@@ -67,11 +68,10 @@ def write_bag(path, messages, topic='/joint_states', storage='mcap', compression
     return path
 
 
-def colors_in(png):
-    """Return the distinct colours (r, g, b) of a PNG that matplotlib wrote."""
-    image = (pytest.importorskip('matplotlib.image').imread(png) * 255).round().astype(int)
-    packed = np.unique(image[..., 0] << 16 | image[..., 1] << 8 | image[..., 2])
-    return {(c >> 16, c >> 8 & 255, c & 255) for c in packed.tolist()}
+def texts_in(svg):
+    """Return the texts of an SVG, which are text and not outlines."""
+    return [element.text for element in ElementTree.parse(svg).iter() if element.tag.endswith(
+        '}text')]
 
 
 @pytest.mark.parametrize(('name', 'start'), [
@@ -89,13 +89,6 @@ def test_default_name_is_the_inputs_in_the_present_directory(walking_csv, tmp_pa
     assert Path('walking.png').is_file()
 
 
-def test_picture_has_the_documented_colors_of_axes_and_feet(walking_csv):
-    assert main(['plot', 'walking.csv']) == 0
-    documented = {(0xd6, 0x27, 0x28), (0x2c, 0xa0, 0x2c), (0x1f, 0x5f, 0xd0)}
-    feet = {(0x6a, 0x3d, 0x9a), (0xe0, 0x82, 0x14)}
-    assert documented | feet <= colors_in('walking.png')
-
-
 def test_same_input_gives_the_same_file(walking_csv):
     for name in ('one.svg', 'two.svg', 'one.pdf', 'two.pdf'):
         assert main(['plot', 'walking.csv', '-o', name]) == 0
@@ -105,52 +98,84 @@ def test_same_input_gives_the_same_file(walking_csv):
 
 
 def test_curves_are_the_poses_of_the_chains(tracks):
-    figure = pictures.feet_figure(tracks, [0.5, 1.0], 'walk', ['left_leg', 'right_leg'])
-    height, forward, left = figure.axes[:3]
-    for track, (z, x, y) in zip(tracks, zip(height.lines, forward.lines, left.lines)):
-        T = np.array([track.chain.forward(q) for q in track.positions])
-        assert np.allclose(z.get_ydata(), T[:, 2, 3])
-        assert np.allclose(x.get_ydata(), -T[:, 0, 3])  # root_link's x is backward
-        assert np.allclose(y.get_ydata(), -T[:, 1, 3])  # and its y is to the right
-        assert np.array_equal(z.get_xdata(), track.times)
+    figure = drawing.feet_figure(tracks, [0.5, 1.0], 'walk', {})
+    for panel, row in zip(figure.axes, (2, 0, 1)):
+        for track, curve in zip(tracks, panel.lines):
+            T = np.array([track.chain.forward(q) for q in track.positions])
+            assert np.allclose(curve.get_ydata(), T[:, row, 3])
+            assert np.array_equal(curve.get_xdata(), track.times)
 
 
-def test_range_violations_are_found_with_joint_limit_and_time(tracks):
+def test_joints_outside_their_ranges_are_found_with_limit_and_time(tracks):
     q = tracks[1].positions.copy()
-    q[50:60, 3] = np.radians(1)  # knee -125 .. 0
-    q[70, 4] = np.radians(-43)  # ankle pitch -42 .. 21
-    found = over_time.violations(ChainTrack(tracks[1].chain, tracks[1].times, q))
-    assert [(v.joint, v.limit) for v in found] == [
-        ('r_knee', '> 0°'), ('r_ankle_pitch', '< \N{MINUS SIGN}42°')]
-    assert np.allclose(found[0].spans, [(0.5, 0.6)])
-    assert np.allclose(found[1].spans, [(0.7, 0.71)])
-    assert over_time.violations(tracks[1]) == []
+    q[50:60, 3] = np.radians(5)  # knee -124 .. 4
+    q[70, 4] = np.radians(-36)  # ankle pitch -35 .. 35
+    (knee, spans), (ankle, moment) = drawing.outside_ranges(
+        ChainTrack(tracks[1].chain, tracks[1].times, q))
+    assert (knee, ankle) == ('r_knee > 4°', 'r_ankle_pitch < \N{MINUS SIGN}35°')
+    assert np.allclose(spans, [(0.5, 0.6)])
+    assert np.allclose(moment, [(0.7, 0.71)])
+    assert drawing.outside_ranges(tracks[1]) == []
 
 
 def test_gaps_break_the_curve(tracks):
     keep = np.r_[0:80, 120:200]
     cut = [ChainTrack(t.chain, t.times[keep], t.positions[keep]) for t in tracks]
-    assert np.allclose(over_time.gaps(cut[0]), [(0.79, 1.2)])
-    assert over_time.gaps(tracks[0]) == []
-    curve = pictures.feet_figure(cut, [0.5], 'walk', []).axes[0].lines[0]
-    assert np.isnan(curve.get_ydata()).sum() == 1
-    assert np.isnan(curve.get_ydata()[80])
+    assert np.allclose(drawing.gaps(cut), [(0.79, 1.2)])
+    assert drawing.gaps(tracks) == []
+    curve = drawing.feet_figure(cut, [0.5], 'walk', {}).axes[0].lines[0]
+    assert np.flatnonzero(np.isnan(curve.get_ydata())).tolist() == [80]
 
 
-def test_long_curves_are_thinned_without_losing_their_extremes(tracks):
-    chain = tracks[0].chain
+def test_a_long_recording_is_a_band_from_its_lowest_to_its_highest_values(tracks):
     q = np.tile(tracks[0].positions, (500, 1))
     q[12_345, 3] = -2.0
-    long = ChainTrack(chain, np.arange(len(q)) / 1000, q)
-    curve = pictures.feet_figure([long], [1.0], 'walk', []).axes[0].lines[0]
-    assert len(curve.get_ydata()) < 7000
-    assert curve.get_ydata().max() == long.poses[:, 2].max() == long.poses[12_345, 2]
-    assert curve.get_ydata().min() == long.poses[:, 2].min()
+    times = np.arange(len(q)) / 100
+    times[60_000:] += 20.0  # a gap
+    long = ChainTrack(tracks[0].chain, times, q)
+    lowest, highest = drawing.feet_figure([long], [1.0], 'walk', {}).axes[0].lines[:2]
+    z = long.poses[:, 2]
+    assert np.nanmin(lowest.get_ydata()) == z.min()
+    assert np.nanmax(highest.get_ydata()) == z.max() == z[12_345]
+    assert len(lowest.get_xdata()) < 1000
+    [hole] = np.flatnonzero(np.isnan(lowest.get_ydata()))
+    assert 595 < lowest.get_xdata()[hole - 1] < 600 and 620 < lowest.get_xdata()[hole + 1] < 625
+
+
+def test_from_and_to_cut_the_recording(walking_csv, capsys):
+    assert main(['plot', 'walking.csv', '--from', '0.5', '--to', '1.2', '-o', 'cut.svg']) == 0
+    assert '71 poses of left_foot, 71 poses of right_foot' in capsys.readouterr().out
+    assert {'walking.csv   v2_5', 'left foot', 'right foot'} <= set(texts_in('cut.svg'))
+
+
+def test_axes_are_named_and_text_is_text(walking_csv):
+    assert main(['plot', 'walking.csv', '-o', 'feet.svg', '--at', '0.5']) == 0
+    texts = texts_in('feet.svg')
+    for name in 'xyz':  # of the root and of both feet
+        assert texts.count(name) == 3
+    assert 'z in root_link [m]' in texts and 'time [s]' in texts
+    assert main(['plot', 'walking.csv', '-o', 'feet.pdf']) == 0
+    pdf = Path('feet.pdf').read_bytes()
+    assert b'/Type3' not in pdf.replace(b' ', b'') and b'/CIDFontType2' in pdf
+
+
+@pytest.mark.parametrize('backend', ['module://nonsense', 'nonsense'])
+def test_nothing_of_the_users_matplotlib_settings_is_taken(walking_csv, backend):
+    assert main(['plot', 'walking.csv', '-o', 'plain.svg']) == 0
+    Path('matplotlibrc').write_text('text.usetex: true\naxes.facecolor: black\n'
+                                    'text.color: white\n')
+    root = str(Path(__file__).parents[1])
+    done = subprocess.run(
+        [sys.executable, '-m', 'icub_leg_fk', 'plot', 'walking.csv', '-o', 'theirs.svg'],
+        capture_output=True, text=True, check=False,
+        env={**os.environ, 'PYTHONPATH': root, 'MPLBACKEND': backend})
+    assert (done.returncode, done.stderr) == (0, '')
+    assert Path('theirs.svg').read_text() == Path('plain.svg').read_text()
 
 
 def test_default_instants_show_each_foot_lifted_and_ahead(tracks):
     left, right = (track.poses for track in tracks)
-    rows = [round(instant * 100) for instant in telling_instants(tracks)]
+    rows = [round(instant * 100) for instant in default_instants(tracks)]
     apart = (left - right)[rows]
     assert len(rows) == 4
     assert apart[:, 2].max() > 0.035
@@ -253,6 +278,9 @@ def test_failed_picture_leaves_nothing_behind(walking_csv, monkeypatch):
     (['walking.csv', '--at', '1,x'], ['1,x']),
     (['walking.csv', '--at', '1,2,3,4,5'], ['1,2,3,4,5', '4']),
     (['walking.csv', '--at', '7'], ['7 s', '0 to 1.99 s']),
+    (['walking.csv', '--from', 'x'], ['--from', "'x'"]),
+    (['walking.csv', '--from', '3'], ['3 to 1.99 s', '0 to 1.99 s']),
+    (['walking.csv', '--from', '1', '--to', '0.5'], ['1 to 0.5 s']),
     (['walking.csv', '--joint-topic', '/legs'], ['--joint-topic', 'CSV']),
     (['walking.csv', '-k', 'no.yaml'], ['no.yaml']),
     (['empty.csv'], ['empty.csv:1', 'header']),
@@ -328,28 +356,12 @@ def test_missing_matplotlib_is_one_line(walking_csv):
     assert 'matplotlib' in done.stderr
 
 
-def test_axes_drawn_in_the_documentation_point_as_they_are_labelled(monkeypatch, tmp_path):
-    """Label and frame agree: `forward` is drawn where -x of the root points, and so on."""
-    from icub_leg_fk.tools.drawing import docs, legs
-
-    directions = {'backward': (1, 0, 0), 'forward': (-1, 0, 0), 'toward the toes': (-1, 0, 0),
-                  'right': (0, 1, 0), 'left': (0, -1, 0), 'up': (0, 0, 1)}
-    drawn = []
-
-    def look(view, T, length, width, zorder, labels=()):
-        drawn.extend((label.partition('  ')[2], T[:3, i]) for i, label in enumerate(labels))
-    monkeypatch.setattr(legs, 'draw_triad', look)
-    docs.frames_figure(Catalog.load())
-    assert len(drawn) == 9
-    for label, axis in drawn:
-        assert np.allclose(axis, directions[label], atol=1e-9), label
-
-
 def test_pictures_of_the_documentation_can_be_made_anew(tmp_path):
-    subprocess.run([sys.executable, '-m', 'icub_leg_fk.tools.drawing.docs', tmp_path], check=True,
-                   cwd=Path(__file__).parents[1])
+    root = Path(__file__).parents[1]
+    subprocess.run([sys.executable, root / 'docs' / 'pictures.py', tmp_path], check=True,
+                   env={**os.environ, 'PYTHONPATH': str(root)})
     sizes = {path.name: path.stat().st_size for path in tmp_path.iterdir()}
-    assert sizes.keys() == {'frames.png', 'legs.png', 'walking.png'}
+    assert sizes.keys() == {'frames.png', 'walking.png'}
     assert all(20_000 < size < 300_000 for size in sizes.values())
 
 
@@ -370,18 +382,16 @@ chains:
 """
 
 
-def test_other_robots_have_plain_axes_and_a_scale_that_fits(tmp_path):
+def test_other_robots_have_a_scale_that_fits(tmp_path):
     (tmp_path / 'arm.yaml').write_text(ARM)
     chain = Catalog.load(tmp_path / 'arm.yaml').chain('arm', 'v1')
     track = ChainTrack(chain, np.arange(9.0), np.linspace((0, 0), (1, 2), 9))
-    figure = pictures.feet_figure([track], [0.0, 8.0], 'arm', [])
-    assert [panel.get_title() for panel in figure.axes[:3]] == [
-        'z  [m]', 'x  [m]', 'y  [m]']
+    figure = drawing.feet_figure([track], [0.0, 8.0], 'arm', {})
+    assert [panel.get_title(loc='left') for panel in figure.axes[:4]] == [
+        'z in base [m]', 'x in base [m]', 'y in base [m]', 'outside its range']
     assert np.allclose(figure.axes[1].lines[0].get_ydata(), 2 * np.cos(track.positions[:, 0]))
-    assert over_time.violations(track)[0].limit == '> 1.5 m'
-    texts = [text.get_text() for view in figure.axes[4:] for text in view.texts]
-    assert '2' in texts  # on the ruler
-    assert 'forward' not in texts
+    assert drawing.outside_ranges(track)[0][0] == 'lift > 1.5 m'
+    assert any('squares of 0.5 m' in text.get_text() for text in figure.texts)
 
 
 def test_chains_of_several_roots_are_refused(tmp_path, monkeypatch, capsys):

@@ -11,6 +11,12 @@ from icub_leg_fk.errors import LegFKError, ParameterError
 from icub_leg_fk.kinematics import Catalog, Chain
 
 SOLE = 'sole'
+# What the balancing controllers take an iCub's foot to be, in its sole frame [m]
+# (robotology-legacy/WBI-Toolbox-controllers, iCubGenova04: gain.footSize).
+_HEEL, _TOE, _HALF_WIDTH = -0.07, 0.12, 0.04
+SOLE_OUTLINE = (
+    (_HEEL, _HALF_WIDTH, 0.0), (_TOE, _HALF_WIDTH, 0.0), (_TOE, -_HALF_WIDTH, 0.0),
+    (_HEEL, -_HALF_WIDTH, 0.0), (_HEEL, _HALF_WIDTH, 0.0))
 STAMP_SOURCES = ('message', 'now')
 DEFAULT_FRAME = 'dh'
 DEFAULT_TIMEOUT = 0.5  # s

@@ -14,6 +14,9 @@ from types import FrameType
 from typing import Any
 
 _SPIN_PERIOD = 0.25  # s; how long a signal may wait
+LOOPBACK_IS_DOWN = (
+    'the loopback interface is down, over which ROS nodes of one machine find each other; this '
+    'brings it up: sudo ip link set lo up')
 _HELP = """usage: foot_pose_publisher [--ros-args -p NAME:=VALUE ... --params-file FILE]
 
 Subscribes to joint_states (sensor_msgs/JointState) and publishes the poses of the iCub's feet
@@ -97,10 +100,8 @@ def _run(stop: _StopSignals, argv: list[str]) -> int:
             node = FootPosePublisher()
         except (LegFKError, *START_ERRORS) as error:
             return _refuse(str(error))
-        if not _loopback_is_up():
-            node.get_logger().warning(
-                'the loopback interface is down, over which ROS nodes of one machine find each '
-                'other; this brings it up: sudo ip link set lo up')
+        if not loopback_is_up():
+            node.get_logger().warning(LOOPBACK_IS_DOWN)
         executor.add_node(node)
         while rclpy.ok() and not stop.requested:
             # Unlike spin_once, this takes message after message without coming back in between.
@@ -151,7 +152,8 @@ def _refuse(reason: str) -> int:
     return 1
 
 
-def _loopback_is_up() -> bool:
+def loopback_is_up() -> bool:
+    """Return whether processes of this machine can reach each other."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         return probe.connect_ex(('127.0.0.1', 9)) == 0  # sends nothing
 

@@ -8,6 +8,7 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
+from icub_leg_fk.ros.configuration import SOLE_OUTLINE
 import numpy as np
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
@@ -18,12 +19,7 @@ _BONE_COLOR = ColorRGBA(r=0.75, g=0.75, b=0.78, a=1.0)
 _JOINT_COLOR = ColorRGBA(r=0.0, g=0.45, b=0.70, a=1.0)
 _SOLE_COLOR = ColorRGBA(r=0.90, g=0.60, b=0.0, a=1.0)
 _SOLE_WIDTH = 0.006  # m
-# What the balancing controllers take an iCub's foot to be, in its sole frame [m]
-# (robotology-legacy/WBI-Toolbox-controllers, iCubGenova04: gain.footSize).
-_HEEL, _TOE, _HALF_WIDTH = -0.07, 0.12, 0.04
-_SOLE = np.array([[x, y, 0.0, 1.0] for x, y in (
-    (_HEEL, _HALF_WIDTH), (_TOE, _HALF_WIDTH), (_TOE, -_HALF_WIDTH), (_HEEL, -_HALF_WIDTH),
-    (_HEEL, _HALF_WIDTH))])
+_SOLE = np.hstack((SOLE_OUTLINE, np.ones((5, 1))))
 
 
 def skeleton_markers(chain: Chain, sole: Chain | None, q: Sequence[float], stamp: Time,

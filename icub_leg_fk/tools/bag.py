@@ -25,7 +25,7 @@ from icub_leg_fk.tools.chain_arguments import (
     DEFAULT_VERSION,
     own_versions,
 )
-from icub_leg_fk.tools.output_file import check_target, whole_path
+from icub_leg_fk.tools.output_file import check_target, is_bag, whole_path
 
 if TYPE_CHECKING:
     from icub_leg_fk.kinematics import Chain
@@ -127,7 +127,7 @@ def add_foot_poses(
     source, target = Path(source), Path(target)
     _check_apart(source, target)
     storage = _storage(target, storage)
-    check_target(target, force=force, may_replace=_is_bag)
+    check_target(target, force=force, may_replace=is_bag)
     from icub_leg_fk.tools.bag_reading import joint_connections, open_bag
 
     began = time.monotonic()
@@ -136,7 +136,7 @@ def add_foot_poses(
                    joint_connections(reader, source, joint_topic), only_poses, replace_poses)
         if not storage:
             storage = 'mcap' if _has_mcap(source) else 'sqlite3'
-        with whole_path(target, force=force, may_replace=_is_bag) as place:
+        with whole_path(target, force=force, may_replace=is_bag) as place:
             _write(place, storage, job, progress)
             job.check_use()
         return job.summary(str(target), time.monotonic() - began)
@@ -424,19 +424,6 @@ def _has_mcap(bag: Path) -> bool:
     if not bag.is_dir():
         return bag.suffix == '.mcap'
     return any('.mcap' in entry.suffixes for entry in bag.iterdir())
-
-
-def _is_bag(path: Path) -> bool:
-    """Return whether a path is a bag and nothing more, so that replacing it loses only a bag."""
-    if path.is_symlink():
-        return False
-    if path.is_file():
-        return path.suffix in STORAGES
-    names = {entry.name for entry in path.iterdir()
-             if entry.is_file() and not entry.is_symlink()}
-    kept = {name for name in names if not re.search(r'\.(mcap|db3)(\.zstd)?(-wal|-shm)?$', name)}
-    return (kept == {'metadata.yaml'}
-            and len(names) == len(list(path.iterdir())))
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -5,40 +5,48 @@ from __future__ import annotations
 import argparse
 import os
 from pathlib import Path
+import shutil
 import sys
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
-from icub_leg_fk.errors import LegFKError
+from icub_leg_fk.errors import LegFKError, MissingDependencyError
 from icub_leg_fk.tools.chain_arguments import DEFAULT_VERSION
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from icub_leg_fk.kinematics import Chain
-    from icub_leg_fk.tools.demonstration.replay import Answers
+    from icub_leg_fk.kinematics import Catalog, Chain
+    from icub_leg_fk.tools.demo_replay import Answers, Replay
     from icub_leg_fk.tools.recording import JointRecording
 
 HELP = 'the live demonstration: a walk played through the node, poses shown as they come'
 EXAMPLES = """\
-Starts the node foot_pose_publisher in its own process, plays a walking gait, or a recording, to
-it as JointState messages over DDS, shows the poses of both feet as they arrive, and at the end
-draws them. It talks inside this machine only, in a namespace of its own, and in a ROS_DOMAIN_ID
-of its own unless you have set one: no robot is disturbed. Exit status 0 if every pose arrived.
+Starts the node foot_pose_publisher in its own process, plays a synthetic walking gait, or a
+recording, to it as JointState messages over DDS, shows the poses of both feet as they arrive, and
+at the end draws them. It talks inside this machine only, in a namespace of its own, and in a
+ROS_DOMAIN_ID of its own unless you have set one: no robot is disturbed. Exit status 0 if every
+pose arrived.
 
 A recording is a CSV file with a column `time` in seconds and one per leg joint, in radians.
 
 examples:
   leg_fk demo
+  leg_fk demo --save walk        keeps the joint states as a bag, for leg_fk bag and plot
   leg_fk demo --version v1 --seconds 3 -o v1.png
   leg_fk demo --recording walking.csv"""
 
 CHAINS = ('left_leg', 'right_leg')
+_INTERRUPTED = 128 + 2  # as a shell reports SIGINT
+_COLUMNS = ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
+_COLORS = {'left': '\x1b[38;5;97m', 'right': '\x1b[38;5;172m', 'faint': '\x1b[2m'}
+_SPARKS = '▁▂▃▄▅▆▇█'
+_LIFT = 0.05  # m; of a full spark
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument('--recording', metavar='FILE', type=Path,
-                        help='CSV file to play, in its own timing (default: a walking gait)')
+                        help='CSV file to play, in its own timing (default: a synthetic gait)')
     parser.add_argument('--version', metavar='VERSION', default=DEFAULT_VERSION,
                         help=f'version of both legs (default: {DEFAULT_VERSION})')
     parser.add_argument('--foot-frame', metavar='{dh,sole}', default='dh',
@@ -47,44 +55,59 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='how long to play (default: 10, or the whole recording)')
     parser.add_argument('--rate', metavar='HZ', type=_number(1, 1000),
                         help='messages per second of the gait (default: 100)')
-    parser.add_argument('-o', '--output', metavar='FILE', type=Path, default=Path('demo.png'),
-                        help='picture to write or replace, .png, .svg or .pdf (default: demo.png)')
+    parser.add_argument('-o', '--output', metavar='FILE', type=Path,
+                        help='picture to write, .png, .svg or .pdf (default: demo.png, which is '
+                             'replaced)')
+    parser.add_argument('--save', metavar='DIR', type=Path,
+                        help='keep the joint states as a rosbag2 bag')
+    parser.add_argument('--force', action='store_true',
+                        help='replace an existing picture or bag')
 
 
 def run(args: argparse.Namespace) -> int:
     """Give the demonstration; return 1 if a pose is missing or the node failed."""
     from icub_leg_fk.kinematics import Catalog
-    from icub_leg_fk.tools.demonstration.node import NodeError, stay_on_this_machine
-    from icub_leg_fk.tools.demonstration.replay import ReplayError
-    from icub_leg_fk.tools.drawing.style import check_output
+    from icub_leg_fk.tools.demo_replay import DemoError, stay_on_this_machine
+    from icub_leg_fk.tools.drawing import check_output
+    from icub_leg_fk.tools.output_file import check_target, is_bag
     from icub_leg_fk.tools.signals import stop_on_signals
 
-    check_output(args.output, force=True)
+    picture, force = args.output or Path('demo.png'), args.force or args.output is None
+    check_output(picture, force)
+    if args.save:
+        _rosbags()
+        check_target(args.save, force=args.force, may_replace=is_bag)
     catalog = Catalog.load()
     chains = [catalog.chain(name, args.version, args.foot_frame) for name in CHAINS]
-    recording = _recording(args, chains)
+    recording = _recording(args, catalog, chains)
     domain = stay_on_this_machine()
     print(f'iCub legs {args.version}: {len(recording.times)} JointState messages to '
           f'foot_pose_publisher, poses back over DDS\n'
           f'(this machine only, ROS_DOMAIN_ID {domain}, namespace {_namespace()})\n', flush=True)
     with stop_on_signals():
         try:
-            answers = _play(args, recording, chains)
-        except (NodeError, ReplayError) as error:
+            replay, whole = _play(args, recording, chains)
+        except DemoError as error:
             print(f'leg_fk: error: {error}', file=sys.stderr)
             return 1
-        source = args.recording.name if args.recording else 'walking gait'
-        _draw(args.output, source, recording, chains, answers)
-    return conclude(recording, answers, args.output)
+        status = conclude(replay.answers, recording.times[:len(replay.stamps)].tolist(), whole)
+        if whole and all(answers.arrived for answers in replay.answers):
+            source = args.recording.name if args.recording else 'synthetic gait'
+            _draw(picture, force, f'{source}   {args.version}', recording, replay, catalog, chains)
+            print(f'picture       {picture}', flush=True)
+        if whole and args.save:
+            _save(args.save, args.force, recording, replay.stamps)
+            print(f'bag           {args.save}', flush=True)
+    return status
 
 
-def _recording(args: argparse.Namespace, chains: Sequence[Chain]) -> JointRecording:
-    from icub_leg_fk.kinematics import Catalog
+def _recording(args: argparse.Namespace, catalog: Catalog, chains: Sequence[Chain]
+               ) -> JointRecording:
     from icub_leg_fk.tools.gait import walk
     from icub_leg_fk.tools.recording import read_csv
 
     if args.recording is None:
-        return walk(Catalog.load(), args.version, args.seconds or 10.0, args.rate or 100.0)
+        return walk(catalog, args.version, args.seconds or 10.0, args.rate or 100.0)
     if args.rate is not None:
         raise LegFKError('--rate: found with --recording, which is played in its own timing')
     recording = read_csv(args.recording, [name for chain in chains for name in chain.joint_names])
@@ -92,10 +115,9 @@ def _recording(args: argparse.Namespace, chains: Sequence[Chain]) -> JointRecord
 
 
 def _play(args: argparse.Namespace, recording: JointRecording, chains: Sequence[Chain]
-          ) -> list[Answers]:
-    from icub_leg_fk.tools.demonstration.node import NodeProcess
-    from icub_leg_fk.tools.demonstration.replay import DEPTH, Replay
-    from icub_leg_fk.tools.demonstration.table import LiveTable
+          ) -> tuple[Replay, bool]:
+    """Play the recording; return what came of it, and whether it was played to its end."""
+    from icub_leg_fk.tools.demo_replay import DEPTH, NodeProcess, Replay
 
     # What shall not be lost must be reliable, and may wait while the machine does other things.
     joint_states = f'qos_overrides.{_namespace()}/joint_states.subscription'
@@ -105,50 +127,210 @@ def _play(args: argparse.Namespace, recording: JointRecording, chains: Sequence[
         pose = f'{_namespace()}/foot_pose_publisher/{chain.tip}/pose'
         parameters[f'qos_overrides.{pose}.publisher.depth'] = str(DEPTH)
     with Replay(recording, _namespace(), tuple(chain.tip for chain in chains)) as replay, \
-            NodeProcess(_namespace(), parameters) as node, \
-            LiveTable(replay.answers, recording.times.tolist()) as table:
+            NodeProcess(_namespace(), parameters) as node:
         replay.wait_for_node(node.check)
-        replay.play(table.show, table.period, node.check)
-    return replay.answers
+        with LiveTable(replay.answers, recording.times.tolist(), chains[0].root_frame) as table:
+            try:
+                replay.play(table.show, table.period, node.check)
+                return replay, True
+            except KeyboardInterrupt:
+                return replay, False
 
 
-def _draw(output: Path, source: str, recording: JointRecording, chains: Sequence[Chain],
-          answers: Sequence[Answers]) -> None:
-    """Draw what has arrived, if something has of each foot."""
-    from icub_leg_fk.tools.drawing.pictures import walk_figure
-    from icub_leg_fk.tools.drawing.style import save_picture
+def _draw(path: Path, force: bool, title: str, recording: JointRecording, replay: Replay,
+          catalog: Catalog, chains: Sequence[Chain]) -> None:
+    """Draw what has arrived."""
+    from icub_leg_fk.tools.drawing import feet_figure, save_picture
+    from icub_leg_fk.tools.plot import default_instants
+    from icub_leg_fk.tools.recording import ChainTrack
     import numpy as np
 
-    tracks = [recording.track(chain) for chain in chains]
-    paths = [answer.poses[np.isfinite(answer.latencies)] for answer in answers]
-    if not all(map(len, paths)):
-        return
-    title = f'{source}   {chains[0].version}'
-    save_picture(lambda: walk_figure(tracks, paths, title, CHAINS), output)
+    tracks = []
+    for chain, answers in zip(chains, replay.answers):
+        track, came = recording.track(chain), np.isfinite(answers.latencies)
+        tracks.append(ChainTrack(chain, track.times[came] - recording.times[0],
+                                 track.positions[came], answers.poses[came]))
+    soles = {chain.name: catalog.chain(chain.name, chain.version, 'sole') for chain in chains}
+    save_picture(lambda: feet_figure(tracks, default_instants(tracks), title, soles), path,
+                 force=force)
 
 
-def conclude(recording: JointRecording, answers: Sequence[Answers], output: Path) -> int:
-    """Print the summary; return 0 if each message has exactly one pose per foot."""
+def _save(path: Path, force: bool, recording: JointRecording, stamps: Sequence[int]) -> None:
+    """Write the joint states as they were sent, whole or not at all."""
+    from icub_leg_fk.tools.output_file import is_bag, whole_path
     import numpy as np
 
-    sent = len(recording.times)
+    rosbag2, store = _rosbags()
+    kinds = [store.types[name] for name in (
+        'sensor_msgs/msg/JointState', 'std_msgs/msg/Header', 'builtin_interfaces/msg/Time')]
+    joint_state, header, time = kinds
+    nothing = np.zeros(0)
+    velocities = recording.velocities
+    with whole_path(path, force=force, may_replace=is_bag) as place, \
+            rosbag2.Writer(place, version=rosbag2.Writer.VERSION_LATEST,
+                           storage_plugin=rosbag2.StoragePlugin.MCAP) as writer:
+        topic = writer.add_connection('/joint_states', joint_state.__msgtype__, typestore=store)
+        for i, stamp in enumerate(stamps):
+            message = joint_state(
+                header(time(*divmod(stamp, 1_000_000_000)), ''), list(recording.joint_names),
+                recording.positions[i], nothing if velocities is None else velocities[i], nothing)
+            writer.write(topic, stamp, store.serialize_cdr(message, joint_state.__msgtype__))
+
+
+def _rosbags() -> tuple[Any, Any]:
+    """Return rosbags' module for bags and its message types."""
+    try:
+        from rosbags import rosbag2
+        from rosbags.typesys import get_typestore, Stores
+    except ImportError as error:
+        raise MissingDependencyError(
+            "--save needs rosbags: pip install 'rosbags>=0.11.9,<0.12'") from error
+    return rosbag2, get_typestore(Stores.ROS2_JAZZY)
+
+
+def conclude(answers: Sequence[Answers], times: Sequence[float], whole: bool) -> int:
+    """Print the summary and return the exit status.
+
+    Args:
+        answers: the poses of each tip.
+        times: times of the messages sent [s].
+        whole: whether the recording was played to its end.
+
+    Returns:
+        0 if each message has exactly one pose per foot, 1 if not, or 130 after Ctrl-C.
+    """
+    import numpy as np
+
+    sent = len(times)
     arrived = sum(answer.arrived for answer in answers)
     lost = sent * len(answers) - arrived
-    unasked = sum(answer.unasked for answer in answers)
+    unexpected = sum(answer.unexpected for answer in answers)
     latencies = np.concatenate([answer.latencies for answer in answers]) * 1e3
     latency = 'none' if not arrived else 'median {:.2f} ms   p99 {:.2f} ms   max {:.2f} ms'.format(
         *np.nanpercentile(latencies, (50, 99, 100)))
-    duration = recording.times[-1] - recording.times[0]
+    duration = times[-1] - times[0] if sent else 0.0
+    missing = (f'lost          {lost or "none"}' if whole
+               else f'interrupted   {lost} poses had not arrived; no picture, no bag')
     print(f'\nmessages in   {sent}  in {duration:.2f} s\n'
           f'poses out     {arrived}  ({", ".join(f"{a.tip} {a.arrived}" for a in answers)})\n'
-          f'lost          {lost or "none"}\n'
-          f'latency       {latency}\n'
-          f'picture       {output if all(a.arrived for a in answers) else "none"}', flush=True)
-    if lost or unasked:
+          f'{missing}\n'
+          f'latency       {latency}', flush=True)
+    if not whole:
+        return _INTERRUPTED
+    if lost or unexpected:
         print(f'leg_fk: error: of {sent * len(answers)} poses {lost} did not arrive, and '
-              f'{unasked} arrived that belong to no message', file=sys.stderr)
+              f'{unexpected} arrived that belong to no message', file=sys.stderr)
         return 1
     return 0
+
+
+class LiveTable:
+    """Shows the newest poses: on a terminal's second screen, elsewhere in a line a second.
+
+    Args:
+        answers: the poses, filled in by somebody else.
+        times: (N,) times of the messages [s].
+        frame: the frame the poses are in.
+
+    Attributes:
+        period: how often `show` should be called [s].
+    """
+
+    def __init__(self, answers: Sequence[Answers], times: Sequence[float], frame: str) -> None:
+        import numpy as np
+
+        self._answers = answers
+        self._times = np.asarray(times) - times[0]
+        self._frame = frame
+        self._live = sys.stdout.isatty() and os.environ.get('TERM', 'dumb') != 'dumb'
+        self._colored = self._live and not os.environ.get('NO_COLOR')
+        self._sparks = (sys.stdout.encoding or '').lower().replace('-', '') == 'utf8'
+        self._elapsed = 0.0
+        self.period = 0.1 if self._live else 1.0
+
+    def __enter__(self) -> LiveTable:
+        if self._live:
+            self._write('\x1b[?1049h\x1b[?25l')  # the second screen, without a cursor
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._live:
+            self._write('\x1b[?25h\x1b[?1049l')
+            self._write(self._line(self._elapsed) + '\n')
+
+    def show(self, elapsed: float) -> None:
+        """Show the state at a time since the start [s]."""
+        self._elapsed = elapsed
+        if not self._live:
+            self._write(self._line(elapsed) + '\n')
+            return
+        width, height = shutil.get_terminal_size()
+        lines = self._table(elapsed, width)
+        if len(lines) > height:
+            lines = [*lines[:max(0, height - 1)], ('more rows: enlarge the terminal', 'faint')]
+        painted = [self._painted(line[:width], style) for line, style in lines]
+        self._write('\x1b[H' + '\r\n'.join(f'{line}\x1b[K' for line in painted) + '\x1b[J')
+
+    def _line(self, elapsed: float) -> str:
+        feet = []
+        for answers in self._answers:
+            name = answers.tip.replace('_', ' ')
+            x, y, z = answers.poses[answers.newest, :3]
+            feet.append(f'{name}: x {x:+.4f}  y {y:+.4f}  z {z:+.4f} m' if answers.newest >= 0
+                        else f'{name}: no pose yet')
+        return f'{elapsed:7.2f} s   in {self._frame}: ' + '   '.join(feet)
+
+    def _table(self, elapsed: float, width: int) -> list[tuple[str, str]]:
+        shown = _COLUMNS[:max(0, (width - 13) // 9)]
+        hidden = len(_COLUMNS) - len(shown)
+        lines = [(f'poses in {self._frame}, in m', 'faint'),
+                 (' ' * 12 + ''.join(f'{name:>9}' for name in shown), 'faint')]
+        for answers in self._answers:
+            name = answers.tip.replace('_', ' ')
+            newest = answers.poses[answers.newest].round(4) + 0.0  # no negative zeros
+            numbers = (''.join(f'{value:9.4f}' for value in newest[:len(shown)].tolist())
+                       if answers.newest >= 0 else '  no pose yet')
+            lines.append((f'{name:<12}{numbers}', name.split()[0]))
+        if hidden:
+            lines.append((f'{hidden} more columns: widen the terminal', 'faint'))
+        lines.append(('', ''))
+        bar = max(0, min(40, width - 40))
+        if self._sparks and bar:
+            for answers in self._answers:
+                name = answers.tip.replace('_', ' ')
+                lines.append((f'{name:<14}{self._heights(answers, bar)}  height, last 4 s',
+                              name.split()[0]))
+            lines.append(('', ''))
+        total = float(self._times[-1])
+        done = int(bar * (1.0 if total <= 0 else min(1.0, elapsed / total)))
+        full, rest = ('━', '─') if self._sparks else ('#', '.')
+        arrived = sum(answers.arrived for answers in self._answers)
+        lines.append((f'{elapsed:6.2f} s      {full * done}{rest * (bar - done)}  {arrived} poses',
+                      'faint'))
+        return lines
+
+    def _heights(self, answers: Answers, width: int) -> str:
+        """Return the foot's height over the last four seconds as a row of blocks."""
+        import numpy as np
+
+        if answers.newest < 0:
+            return ' ' * width
+        instants = self._times[answers.newest] + np.linspace(-3.9, 0, width)
+        rows = np.searchsorted(self._times, instants).clip(0, answers.newest)
+        low = min(np.nanmin(other.poses[:answers.newest + 1, 2]) for other in self._answers
+                  if other.newest >= 0)
+        levels = (answers.poses[rows, 2] - low) / _LIFT * (len(_SPARKS) - 1)
+        return ''.join(_SPARKS[round(min(max(level, 0), len(_SPARKS) - 1))]
+                       if instant >= 0 and level == level else ' '
+                       for instant, level in zip(instants, levels.tolist(), strict=True))
+
+    def _painted(self, line: str, style: str) -> str:
+        color = _COLORS.get(style, '') if self._colored else ''
+        return f'{color}{line}\x1b[0m' if color else line
+
+    def _write(self, text: str) -> None:
+        sys.stdout.write(text)
+        sys.stdout.flush()
 
 
 def _namespace() -> str:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import os
 from pathlib import Path
+import re
 import shutil
 import tempfile
 from typing import BinaryIO
@@ -85,3 +86,15 @@ def write_text(path: str | Path, text: str, *, force: bool) -> None:
     """
     with whole_file(path, force=force) as stream:
         stream.write(text.encode())
+
+
+def is_bag(path: Path) -> bool:
+    """Return whether a path is a bag and nothing more, so that replacing it loses only a bag."""
+    if path.is_symlink():
+        return False
+    if path.is_file():
+        return path.suffix in ('.mcap', '.db3')
+    entries = list(path.iterdir())
+    others = [entry.name for entry in entries if entry.is_symlink() or not entry.is_file()
+              or not re.search(r'\.(mcap|db3)(\.zstd)?(-wal|-shm)?$', entry.name)]
+    return others == ['metadata.yaml']

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 import math
 from pathlib import Path
 import sys
@@ -28,11 +29,13 @@ HELP = 'a picture of the feet over time and of the legs in space, from a bag or 
 EXAMPLES = """\
 INPUT is a rosbag2 bag (directory, .mcap or .db3) with JointState messages, read by the node's
 own rules, or a CSV file with a column `time` in seconds and one column per joint, in radians;
-other columns are ignored. Gaps and joints outside their documented ranges are marked.
+other columns are ignored. Gaps and joints outside their ranges are marked. Where samples are
+closer together than can be drawn, a curve becomes the band from its lowest to its highest values.
 
 examples:
   leg_fk plot walking.csv
   leg_fk plot walking_bag -o feet.pdf --at 1.5,2.0,2.5
+  leg_fk plot long_walk --from 120 --to 125
   leg_fk plot walking.mcap --version v1 --foot-frame sole --joint-topic /icub/joint_states
   leg_fk plot arm.csv -k my_robot.yaml --version v1 --chains arm"""
 
@@ -56,6 +59,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--at', metavar='T[,T...]', type=_times,
                         help=f'up to {MAX_INSTANTS} times [s] at which to draw the legs (default: '
                              'where one foot is highest above the other, or farthest ahead)')
+    for option, name, end in (('--from', 'begin', 'first'), ('--to', 'end', 'last')):
+        parser.add_argument(option, dest=name, metavar='T', type=_time,
+                            help=f'draw only from/to this time [s] (default: the {end} pose)'
+                            .replace('from/to', option[2:]))
     parser.add_argument('--joint-topic', metavar='TOPIC',
                         help="the bag's topic with joint states (default: /joint_states, or the "
                              'only one there is)')
@@ -64,8 +71,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Draw the picture."""
-    from icub_leg_fk.tools.drawing.pictures import feet_figure
-    from icub_leg_fk.tools.drawing.style import check_output, save_picture
+    from icub_leg_fk.ros.configuration import SOLE
+    from icub_leg_fk.tools.drawing import check_output, feet_figure, save_picture
 
     output = args.output or Path(f'{args.input.resolve().stem}.png')
     check_output(output, args.force)
@@ -79,13 +86,13 @@ def run(args: argparse.Namespace) -> int:
         raise LegFKError(f'--chains: found the root frames {", ".join(sorted(roots))}, allowed: '
                          'chains of one root frame')
     found = _read(args.input, chains, args.joint_topic)
-    tracks = found.tracks
-    instants = _checked(args.at, tracks) if args.at else telling_instants(tracks)
+    tracks = _between(found.tracks, args.begin, args.end)
+    instants = _checked(args.at, tracks) if args.at else default_instants(tracks)
     versions = dict.fromkeys(chain.version for chain in chains)
     title = f'{args.input.resolve().name}   {", ".join(versions)}'
-    soled = [chain.name for chain in chains
-             if 'sole' in catalog.entry(chain.name).versions[chain.version].tip_frames]
-    save_picture(lambda: feet_figure(tracks, instants, title, soled), output)
+    soles = {chain.name: catalog.chain(chain.name, chain.version, SOLE) for chain in chains
+             if SOLE in catalog.entry(chain.name).versions[chain.version].tip_frames}
+    save_picture(lambda: feet_figure(tracks, instants, title, soles), output, force=args.force)
     poses = ', '.join(f'{len(track.times)} poses of {track.chain.tip}' for track in tracks)
     print(f'{output}: {poses}')
     for chain in found.poseless:
@@ -93,7 +100,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def telling_instants(tracks: Sequence[ChainTrack]) -> list[float]:
+def default_instants(tracks: Sequence[ChainTrack]) -> list[float]:
     """Return up to four times [s] worth drawing.
 
     Of two feet those where one is highest above the other and farthest ahead of it, both ways;
@@ -143,6 +150,29 @@ def _checked(instants: list[float], tracks: Sequence[ChainTrack]) -> list[float]
         if not start <= instant <= end:
             raise LegFKError(f'--at: found {instant:g} s, allowed: {start:g} to {end:g} s')
     return sorted(instants)
+
+
+def _between(tracks: Sequence[ChainTrack], begin: float | None, end: float | None
+             ) -> list[ChainTrack]:
+    """Return the parts of the tracks from one time to another [s]."""
+    start = min(float(track.times.min()) for track in tracks)
+    stop = max(float(track.times.max()) for track in tracks)
+    begin, end = start if begin is None else begin, stop if end is None else end
+    inside = [(track.times >= begin) & (track.times <= end) for track in tracks]
+    if not all(mask.any() for mask in inside):
+        raise LegFKError(f'--from, --to: found {begin:g} to {end:g} s, in which not every chain '
+                         f'has a pose; the recording goes from {start:g} to {stop:g} s')
+    return [replace(track, times=track.times[mask], positions=track.positions[mask])
+            for track, mask in zip(tracks, inside)]
+
+
+def _time(text: str) -> float:
+    try:
+        [time] = _times(text)
+    except (argparse.ArgumentTypeError, ValueError):
+        raise argparse.ArgumentTypeError(f'found {text.strip()!r}, allowed: a time in seconds'
+                                         ) from None
+    return time
 
 
 def _times(text: str) -> list[float]:

@@ -57,16 +57,18 @@ class ChainTrack:
         chain: the chain, with its n joints.
         times: (N,) times [s].
         positions: (N, n) joint positions [rad or m].
+        received: (N, 7) poses of the tip as a node sent them; None to compute them.
     """
 
     chain: Chain
     times: Array
     positions: Array
+    received: Array | None = None
 
     @cached_property
     def poses(self) -> Array:
         """(N, 7) rows x, y, z [m], qx, qy, qz, qw of the tip in the root frame."""
-        return self.chain.poses(self.positions)
+        return self.chain.poses(self.positions) if self.received is None else self.received
 
 
 @dataclass

@@ -1,9 +1,14 @@
-"""Plays joint positions to the node over DDS, in their own timing, and collects the poses."""
+"""The demonstration's session: the node in a process of its own, joint states out, poses back."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+import os
+import signal
+import subprocess
+import sys
+import tempfile
 import time
 from typing import Any
 
@@ -13,14 +18,16 @@ from icub_leg_fk.tools.recording import JointRecording
 from icub_leg_fk.tools.signals import held_signals
 import numpy as np
 
-DISCOVERY_TIMEOUT = 20.0  # s
-LAST_POSE_TIMEOUT = 5.0  # s without a pose, after the last message
 DEPTH = 1000  # messages that may wait anywhere when a process is held up
+_DISCOVERY_TIMEOUT = 20.0  # s
+_LAST_POSE_TIMEOUT = 5.0  # s without a pose, after the last message
+_STOP_TIMEOUT = 10.0  # s
 _PROBE_PERIOD = 0.1  # s
+_HIGHEST_DOMAIN = 101  # beyond it DDS's ports meet those that Linux hands out
 
 
-class ReplayError(LegFKError):
-    """The messages could not be played or no answer came."""
+class DemoError(LegFKError):
+    """The node did not start, stopped by itself or was not found."""
 
 
 @dataclass
@@ -31,14 +38,14 @@ class Answers:
         tip: name of the tip.
         poses: (N, 7) rows x, y, z [m], qx, qy, qz, qw by message; NaN where none has come.
         latencies: (N,) from publishing the message to receiving the pose [s]; NaN likewise.
-        unasked: poses received that belong to no message, or to one that had a pose.
+        unexpected: poses received that belong to no message, or to one that had a pose.
         newest: index of the message whose pose came last, or -1.
     """
 
     tip: str
     poses: Array
     latencies: Array
-    unasked: int = 0
+    unexpected: int = 0
     newest: int = -1
 
     @property
@@ -47,17 +54,69 @@ class Answers:
         return int(np.isfinite(self.latencies).sum())
 
 
-class Replay:
-    """Publisher of joint states and subscriber of poses; use as a context manager.
+def stay_on_this_machine() -> str:
+    """Set up the environment so that DDS reaches nobody else; return the ROS_DOMAIN_ID.
+
+    A domain that the user has chosen stays.
+    """
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    os.environ.pop('ROS_STATIC_PEERS', None)
+    return os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % _HIGHEST_DOMAIN))
+
+
+class NodeProcess:
+    """A running `foot_pose_publisher`; use as a context manager.
 
     Args:
-        recording: what to play.
+        namespace: its namespace.
+        parameters: its parameters, by name.
+    """
+
+    def __init__(self, namespace: str, parameters: dict[str, str]) -> None:
+        words = ['--ros-args', '-r', f'__ns:={namespace}']
+        for name, value in parameters.items():
+            words += ['-p', f'{name}:={value}']
+        self._words = (sys.executable, '-m', 'icub_leg_fk.ros.main', *words)
+        self._log = tempfile.TemporaryFile()
+
+    def __enter__(self) -> NodeProcess:
+        # A session of its own: Ctrl-C reaches the demonstration alone, which then stops the node.
+        self._process = subprocess.Popen(
+            self._words, stdin=subprocess.DEVNULL, stdout=self._log, stderr=self._log,
+            start_new_session=True)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with held_signals():
+            if self._process.poll() is None:
+                self._process.send_signal(signal.SIGINT)
+            try:
+                self._process.wait(_STOP_TIMEOUT)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait()
+            self._log.close()
+
+    def check(self) -> None:
+        """Raise the error if the node has stopped by itself."""
+        if (status := self._process.poll()) is not None:
+            self._log.seek(0)
+            said = self._log.read().decode(errors='replace').strip() or 'it said nothing'
+            raise DemoError(f'the node stopped with exit status {status}: '
+                            f'{said.splitlines()[-1].strip()}')
+
+
+class Replay:
+    """Publishes joint states in their own timing and collects poses; use as a context manager.
+
+    Args:
+        recording: what to publish.
         namespace: namespace of the node.
         tips: tips whose poses to collect.
 
     Attributes:
         answers: what has come, per tip.
-        sent: messages published.
+        stamps: stamps of the messages published [ns].
     """
 
     def __init__(self, recording: JointRecording, namespace: str, tips: tuple[str, ...]) -> None:
@@ -66,7 +125,7 @@ class Replay:
         count = len(recording.times)
         self.answers = [Answers(tip, np.full((count, 7), np.nan), np.full(count, np.nan))
                         for tip in tips]
-        self.sent = 0
+        self.stamps: list[int] = []
         self._published = np.zeros(count)
         self._message_of: dict[int, int] = {}  # by stamp [ns]
         self._last_stamp = 0
@@ -92,8 +151,7 @@ class Replay:
                 'leg_fk_demo', namespace=self._namespace, context=self._context,
                 use_global_arguments=False, enable_rosout=False, start_parameter_services=False)
         except (RuntimeError, ValueError) as error:  # what rclpy raises for what rcl refuses
-            raise ReplayError(f'ROS 2 cannot be started: {" ".join(str(error).split())}'
-                              ) from error
+            raise DemoError(f'ROS 2 cannot be started: {" ".join(str(error).split())}') from error
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._joint_state = JointState
@@ -116,15 +174,18 @@ class Replay:
             check: called again and again; raises if there is no hope.
 
         Raises:
-            ReplayError: they have not found each other in time.
+            DemoError: they have not found each other in time.
         """
-        deadline = time.monotonic() + DISCOVERY_TIMEOUT
-        next_probe = 0.0
+        from icub_leg_fk.ros.main import LOOPBACK_IS_DOWN, loopback_is_up
+
+        deadline, next_probe = time.monotonic() + _DISCOVERY_TIMEOUT, 0.0
         while len(self._answered_probe) < len(self.answers):
             check()
             now = time.monotonic()
             if now > deadline:
-                raise ReplayError(f'the node was not found over DDS in {DISCOVERY_TIMEOUT:g} s')
+                hint = '' if loopback_is_up() else f': {LOOPBACK_IS_DOWN}'
+                raise DemoError(f'the node was not found over DDS in {_DISCOVERY_TIMEOUT:g} s'
+                                f'{hint}')
             if self._matched() and now >= next_probe:
                 next_probe = now + _PROBE_PERIOD
                 stamp = time.time_ns()
@@ -151,33 +212,27 @@ class Replay:
                     check()
                     on_time(now - start)
                 # A negative timeout would be none.
-                wait = min(start + offset, next_call) - now
-                self._spin(max(wait, 0.0))
+                self._spin(max(min(start + offset, next_call) - now, 0.0))
             stamp = max(start_ns + round(offset * 1e9), self._last_stamp + 1)
             self._message_of[stamp] = index
             self._published[index] = time.monotonic()
             self._publish(stamp, index)
-            self.sent += 1
-        self._await_the_rest(check)
+            self.stamps.append(stamp)
+        arrived, deadline = -1, 0.0
+        while (now_arrived := sum(a.arrived for a in self.answers)) < len(times) * len(
+                self.answers):
+            if now_arrived > arrived:
+                arrived, deadline = now_arrived, time.monotonic() + _LAST_POSE_TIMEOUT
+            if time.monotonic() > deadline:
+                break
+            check()
+            self._spin(0.1)
         on_time(float(times[-1]))
 
     def _spin(self, seconds: float) -> None:
         # What a signal raises inside of rclpy it makes another exception of, or loses.
         with held_signals():
             self._executor.spin_once(timeout_sec=seconds)
-
-    def _await_the_rest(self, check: Callable[[], None]) -> None:
-        arrived, deadline = -1, 0.0
-        while (now := self._arrived()) < self.sent * len(self.answers):
-            if now > arrived:
-                arrived, deadline = now, time.monotonic() + LAST_POSE_TIMEOUT
-            if time.monotonic() > deadline:
-                return
-            check()
-            self._spin(0.1)
-
-    def _arrived(self) -> int:
-        return sum(answers.arrived for answers in self.answers)
 
     def _matched(self) -> bool:
         return self._publisher.get_subscription_count() > 0 and all(
@@ -195,7 +250,7 @@ class Replay:
                 return
             index = self._message_of.get(stamp, -1)
             if index < 0 or not np.isnan(answers.latencies[index]):
-                answers.unasked += 1
+                answers.unexpected += 1
                 return
             p, q = message.pose.position, message.pose.orientation
             answers.poses[index] = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)

@@ -1,1 +1,0 @@
-"""The parts of the live demonstration: node, replay and table."""

@@ -1,1 +1,0 @@
-"""Pictures of feet over time and of legs in space."""
