@@ -49,7 +49,7 @@ clean:
 	@touch $@
 
 .venv/.bench: .venv/.ros
-	@for library in pin roboticstoolbox-python; do \
+	@for library in pin roboticstoolbox-python PyKDL; do \
 	  .venv/bin/python -m pip install --quiet $$library || \
 	    echo "make: without $$library, which cannot be installed here" >&2; \
 	done; touch $@

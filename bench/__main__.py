@@ -1,55 +1,56 @@
-"""Measures everything: `python -m bench`; a table on stdout, figures in JSON, a picture."""
+"""Measure everything beside what it is compared to: `python -m bench`, or `make bench`."""
 
 from __future__ import annotations
 
 import argparse
+from importlib.util import find_spec
 import os
-from pathlib import Path
 import sys
 
-PARTS = ('node', 'kinematics', 'bag')
+PARTS = ('start', 'kinematics', 'node', 'bag')
+NEEDS = {'node': ('rclpy', 'sensor_msgs'), 'bag': ('rosbags',)}
 _QUIET_LOAD = 0.5  # processes; what else runs shows in every figure
 
 
 def main() -> int:
-    """Run the parts asked for; return 0 if every promise holds, else 1."""
+    """Measure; return 0, or with --check 1 if a promise is missed."""
     parser = argparse.ArgumentParser(prog='python -m bench', description=__doc__)
     parser.add_argument('parts', nargs='*', metavar='PART', default=list(PARTS),
                         help=f'what to measure: {", ".join(PARTS)} (default: all)')
     parser.add_argument('--quick', action='store_true',
                         help='only see that everything runs; the figures mean little')
-    parser.add_argument('--json', type=Path, default=Path('build/bench.json'), metavar='FILE')
-    parser.add_argument('--picture', type=Path, default=Path('build/bench.png'), metavar='FILE')
+    parser.add_argument('--check', action='store_true',
+                        help='exit status 1 if a promise is missed')
     args = parser.parse_args()
     if unknown := set(args.parts) - set(PARTS):
         parser.error(f'found part {", ".join(sorted(unknown))}, allowed: {", ".join(PARTS)}')
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
 
-    from bench.picture import draw
-    from bench.report import make_room, Report
-    make_room(parser, args.json, args.picture)
+    from bench.report import Report
     report = Report()
     if (load := os.getloadavg()[0]) > _QUIET_LOAD:
-        report.note(f'this machine is busy (load {load:.1f}); expect wide spreads')
-    if 'node' in args.parts:
-        from bench.node_bench import Effort, measure_node
-        measure_node(report, Effort(1, 50, 1, False) if args.quick
-                     else Effort(7, 1000, 12, True))
-    if 'kinematics' in args.parts:
-        from bench.kinematics_bench import measure_kinematics
-        measure_kinematics(report, seconds=0.1 if args.quick else 1.0)
-    if 'bag' in args.parts:
-        from bench.bag_bench import measure_bag
-        measure_bag(report, quick=args.quick)
-    report.write(args.json)
-    print(f'\nfigures in {args.json}', end='')
-    if report.growth:
-        draw(report, args.picture)
-        print(f', picture in {args.picture}', end='')
-    broken = report.broken_promises()
-    print(f'\nnot kept: {"; ".join(broken)}' if broken else '\nall promises kept')
-    return 1 if broken else 0
+        report.note(f'this machine is busy (load {load:.1f}): expect wide spreads')
+    for part in (part for part in PARTS if part in args.parts):
+        missing = [library for library in NEEDS.get(part, ()) if find_spec(library) is None]
+        if missing:
+            report.section(f'{part}: not measured, without {", ".join(missing)}')
+        else:
+            _measure(part, report, args.quick)
+    print(f'\n{report.verdict()}')
+    return int(args.check and not all(promise.is_kept for promise in report.promises))
+
+
+def _measure(part: str, report: object, quick: bool) -> None:
+    if part == 'node':
+        from bench.node_bench import measure_node as measure
+    elif part == 'bag':
+        from bench.bag_bench import measure_bag as measure
+    elif part == 'start':
+        from bench.kinematics_bench import measure_start as measure
+    else:
+        from bench.kinematics_bench import measure_kinematics as measure
+    measure(report, quick)
 
 
 if __name__ == '__main__':

@@ -1,4 +1,4 @@
-"""Point 6 and half of point 7: `leg_fk bag` beside the plain loop over rosbags."""
+"""`leg_fk bag` beside the plain loop over rosbags: time, memory, and two jobs beside one."""
 
 from __future__ import annotations
 
@@ -13,17 +13,14 @@ import time
 from typing import NamedTuple
 
 from bench.joint_messages import joint_names, joint_positions
-from bench.measure import figure, peak_resident_bytes, ratio
-from bench.report import Report
+from bench.report import ratio, Report, resident_bytes
 
 _JOINTS = 32
 _RATE = 1000  # Hz
 _START = 1_700_000_000 * 1_000_000_000  # ns
 _GAIT_MESSAGES = 100
-_LENGTHS = (10, 30, 60)  # s
-_JOBS_LENGTH = 180  # s
-_OURS = (sys.executable, '-m', 'icub_leg_fk.tools.leg_fk', 'bag')
-_PLAIN = (sys.executable, '-m', 'bench.plain_bag')
+_OURS = (sys.executable, '-m', 'icub_leg_fk', 'bag')
+_PLAIN = (sys.executable, '-m', 'bench.plain')
 
 
 class _Run(NamedTuple):
@@ -32,63 +29,36 @@ class _Run(NamedTuple):
 
 
 def measure_bag(report: Report, quick: bool) -> None:
-    """Add the rows of point 6, and time against length to the picture."""
-    lengths, jobs_length, rounds = ((1, 2), 2, 1) if quick else (_LENGTHS, _JOBS_LENGTH, 3)
-    ours: dict[int, list[_Run]] = {seconds: [] for seconds in lengths}
-    plain: dict[int, list[_Run]] = {seconds: [] for seconds in lengths}
+    """Add speed, memory and two jobs."""
+    short, long, jobs_length, rounds = (1, 2, 2, 1) if quick else (10, 40, 120, 3)
+    runs: dict[str, list[_Run]] = {'short': [], 'ours': [], 'plain': [], 'twists': []}
+    jobs: dict[int, list[float]] = {1: [], 2: []}
     with TemporaryDirectory(prefix='bench_bag_') as directory:
-        folder = Path(directory)
-        bags = {seconds: write_bag(folder / f'{seconds}_s', seconds) for seconds in lengths}
+        folder, out = Path(directory), Path(directory) / 'out'
+        bag, small = (str(write_bag(folder / f'{length}_s', length)) for length in (long, short))
+        pair = [str(write_bag(folder / name, jobs_length)) for name in ('one', 'two')]
         for _ in range(rounds):
-            for seconds, bag in bags.items():
-                ours[seconds].append(_time([*_OURS, str(bag)], folder / 'out', one_core=True))
-                plain[seconds].append(_time([*_PLAIN, str(bag)], folder / 'out', one_core=True))
-        longest = str(bags[lengths[-1]])
-        twists = [_time([*_OURS, '--twist', longest], folder / 'out', one_core=True)
-                  for _ in range(rounds)]
-        jobs = _time_jobs(folder, jobs_length, rounds)
-    _report_speed(report, ours, plain, twists)
-    report.row(f'two bags of {jobs_length} s, --jobs 1 / --jobs 2', ratio(jobs[1], jobs[2]), 'x',
-               at_least=1.7)
-    _report_memory(report, ours)
-    for name, runs in (('ours', ours), ('plain', plain)):
-        for length, of_length in runs.items():
-            report.grow('bag', name, length, figure([run.seconds for run in of_length]))
-
-
-def _time_jobs(folder: Path, seconds: int, rounds: int) -> dict[int, list[float]]:
-    """Return how long two bags take with one and with two jobs [s]."""
-    bag, twin = write_bag(folder / 'bag', seconds), folder / 'twin'
-    shutil.copytree(bag, twin)
-    taken: dict[int, list[float]] = {1: [], 2: []}
-    for _ in range(rounds):
-        for jobs, readings in taken.items():
-            readings.append(_time([*_OURS, str(bag), str(twin), '--jobs', str(jobs), '--out-dir'],
-                                  folder / 'out').seconds)
-    return taken
-
-
-def _report_speed(report: Report, ours: dict[int, list[_Run]], plain: dict[int, list[_Run]],
-                  twists: list[_Run]) -> None:
-    longest = max(ours)
-    messages = longest * _RATE
-    seconds = {name: [run.seconds for run in runs] for name, runs in (
-        ('ours', ours[longest]), ('plain', plain[longest]), ('twists', twists))}
-    report.section(f'6. leg_fk bag, mcap to mcap, one core, start included: {longest} s at '
-                   f'{_RATE} Hz, {_JOINTS} joints, two feet')
+            for name, command in {'ours': [*_OURS, bag], 'plain': [*_PLAIN, bag],
+                                  'twists': [*_OURS, '--twist', bag],
+                                  'short': [*_OURS, small]}.items():
+                runs[name].append(_time(command, out, one_core=True))
+            for count, readings in jobs.items():
+                readings.append(_time([*_OURS, *pair, '--jobs', str(count), '--out-dir'],
+                                      out).seconds)
+    seconds = {name: [run.seconds for run in of_name] for name, of_name in runs.items()}
+    report.section(f'leg_fk bag, mcap to mcap, one core, start included: {long} s at {_RATE} Hz, '
+                   f'{_JOINTS} joints, two feet')
     for name, label in (('ours', 'leg_fk bag'), ('twists', 'leg_fk bag --twist'),
-                        ('plain', 'plain loop')):
-        report.row(f'{label}, per message', figure([s / messages * 1e6 for s in seconds[name]]),
-                   'us')
-    report.row('plain / leg_fk bag', ratio(seconds['plain'], seconds['ours']), 'x', at_least=8.0)
-    report.row('times real time', figure([longest / s for s in seconds['ours']]), 'x',
-               at_least=60.0)
-
-
-def _report_memory(report: Report, ours: dict[int, list[_Run]]) -> None:
-    report.section('7. memory of leg_fk bag: peak resident size')
-    for length in (min(ours), max(ours)):
-        report.row(f'{length} s', figure([run.peak for run in ours[length]]), 'MB', at_most=200.0)
+                        ('plain', 'plain loop over rosbags')):
+        report.row(f'{label}, per message', [s / long / _RATE * 1e6 for s in seconds[name]], 'us')
+    report.row('times real time', [long / s for s in seconds['ours']], 'x')
+    report.row('bag, plain loop / here', ratio(seconds['plain'], seconds['ours']), 'x',
+               at_least=3.0)
+    for name, length in (('short', short), ('ours', long)):
+        report.row(f'bag, peak memory, {length} s', [run.peak for run in runs[name]], 'MB',
+                   at_most=80.0)
+    report.row(f'bag, two of {jobs_length} s, --jobs 1 / --jobs 2', ratio(jobs[1], jobs[2]), 'x',
+               at_least=1.6)
 
 
 def write_bag(path: Path, seconds: int) -> Path:
@@ -127,7 +97,7 @@ def _time(command: Sequence[str], output: Path, one_core: bool = False) -> _Run:
     os.sched_setaffinity(0, cores)
     peak = 0
     while process.poll() is None:
-        peak = max(peak, peak_resident_bytes(process.pid))
+        peak = max(peak, resident_bytes(process.pid, 'VmHWM:'))
         try:
             process.wait(timeout=0.02)
         except subprocess.TimeoutExpired:

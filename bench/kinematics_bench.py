@@ -1,84 +1,151 @@
-"""Point 5: one pose and many poses, beside Pinocchio, PyKDL and roboticstoolbox."""
+"""One pose and many poses beside Pinocchio, PyKDL and roboticstoolbox; `leg_fk pose`'s start."""
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
+from collections.abc import Callable
 import subprocess
 import sys
-import tracemalloc
+import time
 from typing import Any
 
-from bench.kinematics_peers import PEERS, readings_us
-from bench.measure import difference, figure, ratio
-from bench.report import Report
+from bench.report import ratio, Report
 from icub_leg_fk.kinematics import Catalog, Chain
 import numpy as np
 
-_PEERS_FILE = Path(__file__).with_name('kinematics_peers.py')
-_PYTHONS = (sys.executable, '/usr/bin/python3')  # Debian's PyKDL is in the system's Python only
-_MANY_HOW = {'pinocchio': 'loop over many', 'pykdl': 'loop over many',
-             'roboticstoolbox': 'many matrices in one call'}
-_TOLERANCE = 1e-9  # m, and each rotation entry; so that nobody is timed on another robot
+_READINGS = 9
 _MANY = 100_000
+_TOLERANCE = 1e-9  # m, and each rotation entry; so that nobody is timed on another robot
+
+One = Callable[[Any], Any]
+"""Computes one pose with its quaternion, or None to be told of the matrix of it."""
 
 
-def measure_kinematics(report: Report, seconds: float) -> None:
-    """Add the rows of point 5; each figure takes about `seconds`."""
-    chain = Catalog.load(None).chain('left_leg', 'v2_5', 'dh')
-    rng = np.random.default_rng(5)
-    Q = rng.uniform(chain.lower, chain.upper, (_MANY, chain.n))
-    vectors = [tuple(q) for q in Q[:1000].tolist()]
-
-    def one() -> None:
-        for q in vectors:
-            chain.pose(q)
-    ours_one = readings_us(one, len(vectors), seconds)
-    ours_many = readings_us(lambda: chain.poses(Q), len(Q), seconds)
-    peers = {name: _peer(name, chain, vectors, seconds) for name in PEERS}
-    report.section('5. kinematics: left_leg v2_5')
-    report.row('one pose with quaternion', figure(ours_one), 'us', at_most=3.5)
-    report.row('many poses with quaternions', figure(ours_many), 'us', at_most=0.25)
-    for name, peer in peers.items():
-        if isinstance(peer, str):
-            report.note(f'{name}: not measured: {peer}')
-            continue
-        label = f'{name} {peer["version"]}'.strip()
-        report.row(f'{label}, one pose with quaternion', figure(peer['one']), 'us')
-        report.row(f'{label}, {_MANY_HOW[name]}', figure(peer['many']), 'us')
-    if not isinstance(peers['pinocchio'], str):
-        report.row("many poses, Pinocchio's loop / ours",
-                   ratio(peers['pinocchio']['many'], ours_many), 'x', at_least=8.0)
-    beyond = [_memory_beyond_result(chain, Q[:count]) for count in (_MANY // 10, _MANY)]
-    report.row(f'memory beyond the result: {_MANY} poses less {_MANY // 10}',
-               difference([beyond[1]], [beyond[0]]), 'MB', at_most=0.1)
+def measure_start(report: Report, quick: bool) -> None:
+    """Add the time that `leg_fk pose` takes from the shell, beside its two libraries alone."""
+    commands = {
+        'leg_fk pose left_leg': ['-m', 'icub_leg_fk', 'pose', 'left_leg', '--degrees', *'000000'],
+        'python -c "import numpy, yaml"': ['-c', 'import numpy, yaml']}
+    seconds: dict[str, list[float]] = {name: [] for name in commands}
+    for _ in range(2 if quick else 15):
+        for name, words in commands.items():
+            began = time.perf_counter()
+            subprocess.run([sys.executable, *words], check=True, stdout=subprocess.DEVNULL)
+            seconds[name].append(time.perf_counter() - began)
+    report.section('the command from the shell')
+    for name, readings in seconds.items():
+        report.row(name, readings, 's')
+    ours, imports = seconds.values()
+    report.row('leg_fk pose / imports', ratio(ours, imports), 'x', at_most=1.5)
 
 
-def _memory_beyond_result(chain: Chain, Q: Any) -> float:
-    """Return the peak of what `poses` allocates beyond what it returns [MB]."""
-    tracemalloc.start()
-    result = chain.poses(Q)
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    return float((peak - result.nbytes) / 1e6)
+def measure_kinematics(report: Report, quick: bool) -> None:
+    """Add one pose and many poses, in turns with each library."""
+    chain = Catalog.load().chain('left_leg', 'v2_5', 'dh')
+    Q = np.random.default_rng(5).uniform(chain.lower, chain.upper, (_MANY, chain.n))
+    few = Q[:100] if quick else Q[:1000]
+    lists = few.tolist()
+    report.section('kinematics: left_leg v2_5, pose with quaternion')
+    one: dict[str, list[float]] = {'here': []}
+    peers: dict[str, tuple[One, Any]] = {}
+    for name, make in (('Pinocchio', _pinocchio), ('PyKDL', _pykdl),
+                       ('roboticstoolbox', _roboticstoolbox)):
+        try:
+            peers[name] = make(chain, few)
+        except ImportError as error:
+            report.note(f'{name}: not measured: {error}')
+    one |= {name: [] for name in peers}
+    many: list[float] = []
+    loop: list[float] = []
+    for _ in range(3 if quick else _READINGS):
+        one['here'].append(_microseconds(chain.pose, lists))
+        for name, (pose, vectors) in peers.items():
+            one[name].append(_microseconds(pose, vectors[:20] if name == 'roboticstoolbox'
+                                           else vectors))
+        began = time.perf_counter()
+        chain.poses(Q)
+        many.append((time.perf_counter() - began) / len(Q) * 1e6)
+        if 'Pinocchio' in peers:
+            pose, vectors = peers['Pinocchio']
+            out = np.empty((len(few), 7))
+            began = time.perf_counter()
+            for i, q in enumerate(vectors):
+                out[i] = pose(q)
+            loop.append((time.perf_counter() - began) / len(few) * 1e6)
+    for name, readings in one.items():
+        report.row(f'one pose, {name}', readings, 'us')
+    report.row('many poses, each, here', many, 'us')
+    if 'Pinocchio' in peers:
+        report.row('many poses, each, a loop over Pinocchio', loop, 'us')
+        report.row('one pose / Pinocchio', ratio(one['here'], one['Pinocchio']), 'x', at_most=4.5)
+        report.row('many poses, loop over Pinocchio / here', ratio(loop, many), 'x', at_least=8.0)
 
 
-def _peer(name: str, chain: Chain, vectors: list[tuple[float, ...]],
-          seconds: float) -> dict[str, Any] | str:
-    """Return a library's figures, or why there are none."""
-    task = json.dumps({
-        'links': [(link.a, link.d, link.alpha, link.offset) for link in chain.links],
-        'T_root_0': chain.T_root_0.tolist(), 'Q': vectors, 'seconds': seconds})
-    problems = []
-    for python in _PYTHONS:
-        run = subprocess.run([python, str(_PEERS_FILE), name], input=task, text=True,
-                             capture_output=True, check=False)
-        if run.returncode == 0:
-            answer: dict[str, Any] = json.loads(run.stdout.splitlines()[-1])
-            expected = [chain.forward(q) for q in vectors[:len(answer['poses'])]]
-            error = np.abs(np.array(answer['poses']) - expected).max()
-            if error > _TOLERANCE:
-                return f'computes another robot, {error:.1e} off'
-            return answer
-        problems.append(run.stderr.strip().splitlines()[-1])
-    return '; '.join(dict.fromkeys(problems))
+def _microseconds(pose: One, vectors: Any) -> float:
+    began = time.perf_counter()
+    for q in vectors:
+        pose(q)
+    return (time.perf_counter() - began) / len(vectors) * 1e6
+
+
+def _check(chain: Chain, q: Any, T: Any) -> None:
+    error = float(np.abs(np.asarray(T) - chain.forward(q)).max())
+    if error > _TOLERANCE:
+        raise AssertionError(f'computes another robot, {error:.1e} off')
+
+
+def _pinocchio(chain: Chain, Q: Any) -> tuple[One, Any]:
+    import pinocchio as pin
+    model = pin.Model()
+    joint, before = 0, pin.SE3(chain.T_root_0)
+    for i, link in enumerate(chain.links):
+        turned = pin.SE3(pin.utils.rotate('z', link.offset), np.zeros(3))
+        joint = model.addJoint(joint, pin.JointModelRZ(), before * turned, f'joint_{i}')
+        # Rz(theta) Tz(d) Tx(a) Rx(alpha), of which Rz(offset) may stand before the joint's turn.
+        before = pin.SE3(pin.utils.rotate('x', link.alpha), np.array([link.a, 0.0, link.d]))
+    tip = model.addFrame(pin.Frame('tip', joint, 0, before, pin.FrameType.OP_FRAME))
+    data = model.createData()
+
+    def pose(q: Any) -> Any:
+        pin.forwardKinematics(model, data, q)
+        return pin.SE3ToXYZQUAT(pin.updateFramePlacement(model, data, tip))
+    pose(Q[0])
+    _check(chain, Q[0], data.oMf[tip].homogeneous)
+    return pose, list(Q)
+
+
+def _pykdl(chain: Chain, Q: Any) -> tuple[One, Any]:
+    import PyKDL as kdl
+    root = chain.T_root_0
+    robot = kdl.Chain()
+    robot.addSegment(kdl.Segment(kdl.Joint(kdl.Joint.Fixed), kdl.Frame(
+        kdl.Rotation(*root[:3, :3].ravel().tolist()), kdl.Vector(*root[:3, 3].tolist()))))
+    for link in chain.links:
+        robot.addSegment(kdl.Segment(kdl.Joint(kdl.Joint.RotZ),
+                                     kdl.Frame.DH(link.a, link.alpha, link.d, link.offset)))
+    solver, frame = kdl.ChainFkSolverPos_recursive(robot), kdl.Frame()
+    vectors = []
+    for values in Q.tolist():
+        q = kdl.JntArray(len(values))
+        for i, value in enumerate(values):
+            q[i] = value
+        vectors.append(q)
+
+    def pose(q: Any) -> Any:
+        solver.JntToCart(q, frame)
+        return frame.p, frame.M.GetQuaternion()
+    pose(vectors[0])
+    _check(chain, Q[0], [[frame[i, j] for j in range(4)] for i in range(3)] + [[0, 0, 0, 1]])
+    return pose, vectors
+
+
+def _roboticstoolbox(chain: Chain, Q: Any) -> tuple[One, Any]:
+    import roboticstoolbox as rtb
+    from spatialmath import SE3, UnitQuaternion
+    robot = rtb.DHRobot([rtb.RevoluteDH(a=link.a, d=link.d, alpha=link.alpha, offset=link.offset)
+                         for link in chain.links], base=SE3(chain.T_root_0))
+    _check(chain, Q[0], robot.fkine(Q[0]).A)
+
+    def pose(q: Any) -> Any:
+        T = robot.fkine(q)
+        return T.t, UnitQuaternion(T)
+    return pose, list(Q)

@@ -9,7 +9,7 @@ import time
 from typing import NamedTuple
 
 from bench.load import Process, Received
-from bench.measure import cpu_ns, resident_bytes
+from bench.report import cpu_ns, resident_bytes
 
 POSES = ('left_foot/pose', 'right_foot/pose')
 TWISTS = ('left_foot/twist', 'right_foot/twist')

@@ -1,104 +1,107 @@
-"""The table on the terminal and the JSON file behind it."""
+"""Figures with their spread, printed as they come; promises kept and missed."""
 
 from __future__ import annotations
 
-from argparse import ArgumentParser
+from collections.abc import Sequence
 from datetime import datetime, timezone
-import json
 import os
 from pathlib import Path
 import platform
-from typing import Any
+import statistics
+import time
+from typing import NamedTuple
 
-from bench.measure import Figure
-from icub_leg_fk.tools.output_file import write_text
+
+class Promise(NamedTuple):
+    """A ratio that was promised, and what was found of it."""
+
+    name: str
+    found: float
+    limit: float
+    at_least: bool
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether the figure is on the right side of its limit."""
+        return self.found >= self.limit if self.at_least else self.found <= self.limit
+
+    def __str__(self) -> str:
+        return f'{self.name} {self.found:.3g} ({"≥" if self.at_least else "≤"} {self.limit:g})'
 
 
 class Report:
-    """Collects rows and prints each as it comes.
-
-    Attributes:
-        rows: one dict per row: section, name, median, low, high, readings, unit, at_most,
-            at_least, holds (None where nothing was promised).
-        growth: series for the picture, by panel and curve: lists of (x, Figure).
-    """
+    """Prints rows of median, lowest and highest reading, and remembers the promises among them."""
 
     def __init__(self) -> None:
-        self.rows: list[dict[str, Any]] = []
-        self.notes: list[str] = []
-        self.growth: dict[str, dict[str, list[tuple[float, Figure]]]] = {}
-        self.machine = machine()
-        self._section = ''
-        print(f'{self.machine}\n\n{"":58}{"median":>10}{"lowest":>10}{"highest":>10}'
+        self.promises: list[Promise] = []
+        print(f'{machine()}\n\n{"":52}{"median":>10}{"lowest":>10}{"highest":>10}'
               f'      promised')
 
     def section(self, title: str) -> None:
         """Begin a part of the table."""
-        self._section = title
         print(f'\n{title}')
 
-    def row(self, name: str, value: Figure, unit: str, at_most: float | None = None,
+    def row(self, name: str, readings: Sequence[float], unit: str, at_most: float | None = None,
             at_least: float | None = None) -> None:
         """Add a row; what is promised is promised of the median."""
-        holds: bool | None = None
-        promised = ''
-        if at_most is not None:
-            holds, promised = value.median <= at_most, f'<= {at_most:g}'
-        elif at_least is not None:
-            holds, promised = value.median >= at_least, f'>= {at_least:g}'
-        self.rows.append({'section': self._section, 'name': name, **value._asdict(), 'unit': unit,
-                          'at_most': at_most, 'at_least': at_least, 'holds': holds})
-        verdict = {None: '', True: 'yes', False: 'NO'}[holds]
-        figures = ''.join(f'{_shown(part):>10}' for part in value[:3])
-        print(f'  {name:56}{figures} {unit:4} {promised:9} {verdict}'.rstrip(), flush=True)
+        median, promised = statistics.median(readings), ''
+        limit = at_least if at_most is None else at_most
+        if limit is not None:
+            promise = Promise(name, median, limit, at_most is None)
+            self.promises.append(promise)
+            promised = (f'{"≤" if at_least is None else "≥"} {limit:g}'.ljust(9)
+                        + ('' if promise.is_kept else 'missed'))
+        figures = ''.join(f'{_shown(value):>10}'
+                          for value in (median, min(readings), max(readings)))
+        print(f'  {name:50}{figures} {unit:4} {promised}'.rstrip(), flush=True)
 
     def note(self, text: str) -> None:
         """Add a line of text."""
-        self.notes.append(text)
         print(f'  {text}', flush=True)
 
-    def grow(self, panel: str, curve: str, x: float, value: Figure) -> None:
-        """Add a point to a curve of the picture."""
-        self.growth.setdefault(panel, {}).setdefault(curve, []).append((x, value))
-
-    def write(self, path: Path) -> None:
-        """Write everything as JSON."""
-        growth = {panel: {curve: [{'x': x, **value._asdict()} for x, value in points]
-                          for curve, points in curves.items()}
-                  for panel, curves in self.growth.items()}
-        write_text(path, json.dumps({
-            'date': datetime.now(timezone.utc).isoformat(timespec='seconds'),
-            'machine': self.machine, 'rows': self.rows, 'growth': growth,
-            'notes': self.notes}, indent=1) + '\n', force=True)
-
-    def broken_promises(self) -> list[str]:
-        """Return the names of the rows whose promise does not hold."""
-        return [row['name'] for row in self.rows if row['holds'] is False]
+    def verdict(self) -> str:
+        """Return a line on the promises kept and missed."""
+        kept = [str(promise) for promise in self.promises if promise.is_kept]
+        missed = [str(promise) for promise in self.promises if not promise.is_kept]
+        return (f'{len(kept)} promises kept: {"; ".join(kept) or "none"}. '
+                f'{len(missed)} missed{": " * bool(missed)}{"; ".join(missed)}.')
 
 
-def make_room(parser: ArgumentParser, *files: Path) -> None:
-    """Make the directories of what is to be written, before any time is spent on it."""
-    try:
-        for file in files:
-            file.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        parser.error(f'{error.filename}: {error.strerror}')
+def ratio(ours: Sequence[float], reference: Sequence[float]) -> list[float]:
+    """Return the ratios of readings taken side by side."""
+    return [a / b for a, b in zip(ours, reference, strict=True)]
+
+
+def percentile(values: Sequence[float], percent: float) -> float:
+    """Return the value below which `percent` of the values lie."""
+    ordered = sorted(values)
+    return ordered[min(len(ordered) - 1, int(len(ordered) * percent / 100))]
+
+
+def cpu_ns(pid: int) -> int:
+    """Return the CPU time that all threads of a process have used [ns].
+
+    Linux builds the clock's id from the process id as clock_getcpuclockid(3) does.
+    """
+    return time.clock_gettime_ns((~pid << 3) | 2)
+
+
+def resident_bytes(pid: int, key: str = 'VmRSS:') -> int:
+    """Return the resident size of a process, or with VmHWM: its peak [bytes]; 0 if it ended."""
+    _, found, value = Path(f'/proc/{pid}/status').read_text(encoding='ascii').partition(key)
+    return int(value.split()[0]) * 1024 if found else 0
 
 
 def machine() -> str:
-    """Return a line on the machine: cores, processor class, Python, numpy."""
+    """Return a line on the machine: cores, processor, Python, numpy."""
     import numpy as np
-    date = datetime.now(timezone.utc).date().isoformat()
-    cores = len(os.sched_getaffinity(0))
-    return (f'{date}, {cores} cores {platform.machine()} ({_processor()}), Linux, '
-            f'Python {platform.python_version()}, numpy {np.__version__}')
 
-
-def _processor() -> str:
-    for line in Path('/proc/cpuinfo').read_text(encoding='utf-8').splitlines():
-        if line.startswith('model name'):
-            return line.split(':', 1)[1].strip()
-    return 'unknown processor'
+    processor = next((line.split(':', 1)[1].strip() for line in
+                      Path('/proc/cpuinfo').read_text(encoding='utf-8').splitlines()
+                      if line.startswith('model name')), 'unknown processor')
+    return (f'{datetime.now(timezone.utc).date()}, {len(os.sched_getaffinity(0))} cores '
+            f'{platform.machine()} ({processor}), Linux, Python {platform.python_version()}, '
+            f'numpy {np.__version__}')
 
 
 def _shown(value: float) -> str:

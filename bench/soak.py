@@ -7,9 +7,7 @@ the first minute (of a longer run), and its latency stays what it was.
 from __future__ import annotations
 
 import argparse
-import json
 import os
-from pathlib import Path
 import signal
 import statistics
 import subprocess
@@ -17,9 +15,7 @@ import sys
 import time
 from typing import Any
 
-from bench.measure import cpu_ns, percentile, resident_bytes
-from bench.report import machine, make_room
-from icub_leg_fk.tools.output_file import write_text
+from bench.report import cpu_ns, machine, percentile, resident_bytes
 
 NAMESPACE = 'soak'
 WINDOW = 10.0  # s
@@ -35,11 +31,9 @@ def main() -> int:
     parser.add_argument('--minutes', type=float, default=10.0)
     parser.add_argument('--rate', type=float, default=1000.0, help='messages per second')
     parser.add_argument('--every', type=float, default=2.0, help='seconds from fault to fault')
-    parser.add_argument('--json', type=Path, default=Path('build/soak.json'), metavar='FILE')
     args = parser.parse_args()
     if not (args.minutes > 0 and 0 < args.rate <= 1e5 and args.every > 0):
         parser.error('found minutes, rate or every out of range, allowed: more than 0')
-    make_room(parser, args.json)
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
     with subprocess.Popen(_command()) as node:
@@ -49,10 +43,7 @@ def main() -> int:
             node.send_signal(signal.SIGINT)
         report['exit code'] = node.wait()
     failures = _failures(report)
-    report['failures'] = failures
-    write_text(args.json, json.dumps(report, indent=1), force=True)
     _print(report)
-    print(f'figures in {args.json}')
     print(f'not endured: {"; ".join(failures)}' if failures else 'endured')
     return 1 if failures else 0
 
@@ -101,10 +92,7 @@ def _soak(pid: int, minutes: float, rate: float, every: float) -> dict[str, Any]
     robot.settle()
     ledgers = robot.ledgers.values()
     return {
-        'machine': machine(),
-        'date': time.strftime('%Y-%m-%d'),
         'minutes': windows[-1]['time'] / 60,
-        'rate': rate,
         'messages': robot.sent,
         'twists': robot.twists,
         'poses': sum(ledger.kept for ledger in ledgers),
@@ -113,7 +101,6 @@ def _soak(pid: int, minutes: float, rate: float, every: float) -> dict[str, Any]
         'examples': [text for ledger in ledgers for text in ledger.examples],
         'complaints': robot.complaints,
         'faults': robot.faults,
-        'windows': windows,
         **_trends(windows),
     }
 
