@@ -8,7 +8,7 @@ PACKAGE = 'icub_leg_fk'
 SHARE = f'share/{PACKAGE}'
 
 ROS = ['ros-jazzy-common-interfaces', 'ros-jazzy-rclpy', 'ros-jazzy-rmw-fastrtps-cpp']
-TOOLS = ['matplotlib>=3.6', 'rosbags>=0.11.9,<0.12', 'sympy']
+TOOLS = ['argcomplete', 'matplotlib>=3.6', 'rosbags>=0.11.9,<0.12', 'sympy']
 TEST = [
     'colcon-common-extensions',
     'distributed',

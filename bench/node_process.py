@@ -50,7 +50,7 @@ class NodeProcess:
         self.joint_topic = f'/{namespace}/joint_states'
         self.topics = [f'/{namespace}/foot_pose_publisher/{output}' for output in outputs]
         command = [sys.executable, '-m', 'bench.reference_nodes', name]
-        ros_arguments = ['--ros-args', '-r', f'__ns:=/{namespace}', '--log-level', 'warn']
+        ros_arguments = ['--ros-args', '-r', f'__ns:=/{namespace}', '--log-level', 'error']
         if name == 'ours':
             command = [sys.executable, '-m', 'icub_leg_fk.ros.main']
             joints = f'qos_overrides.{self.joint_topic}.subscription'

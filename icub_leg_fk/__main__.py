@@ -1,3 +1,4 @@
+# PYTHON_ARGCOMPLETE_OK
 """`python -m icub_leg_fk` is `leg_fk`."""
 
 import sys

@@ -1,14 +1,16 @@
 """Running the `leg_fk` command as a user does: in a process of its own."""
 
+import os
 import subprocess
 import sys
 
 COMMAND = [sys.executable, '-m', 'icub_leg_fk.tools.leg_fk']
 
 
-def leg_fk(*words):
+def leg_fk(*words, environment=None):
     """Run `leg_fk` to its end; return the finished process with its output as text."""
-    return subprocess.run([*COMMAND, *map(str, words)], capture_output=True, text=True, timeout=60)
+    return subprocess.run([*COMMAND, *map(str, words)], capture_output=True, text=True, timeout=60,
+                          env={**os.environ, **(environment or {})})
 
 
 def assert_one_line_complaint(done, complaint):

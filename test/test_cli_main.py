@@ -121,13 +121,41 @@ def test_a_terminal_without_utf_8_gets_escapes_instead_of_an_error(tmp_path):
 
 
 @pytest.mark.parametrize(('words', 'complaint'), [
-    ([], 'COMMAND'),
-    (['poses'], "invalid choice: 'poses'"),
-    (['po\nse'], 'invalid choice'),
-    (['list', '--jason'], 'unrecognized arguments: --jason'),
-    (['list', '--js'], 'unrecognized arguments: --js'),
+    (['po\nse'], "unknown command 'po\\nse'"),
+    (['list', '--js'], 'unknown option --js; did you mean --json?'),
     (['list', 'left_leg'], 'unrecognized arguments: left_leg'),
     (['--verbose'], 'COMMAND'),
 ])
 def test_a_mistake_is_one_line_and_exit_2(words, complaint):
     assert_one_line_complaint(leg_fk(*words), complaint)
+
+
+def test_alone_it_lists_its_commands():
+    done = leg_fk()
+    assert (done.returncode, done.stderr) == (0, '')
+    assert all(f'\n    {command} ' in done.stdout for command in MODULES)
+
+
+@pytest.mark.parametrize(('words', 'complaint'), [
+    (['pose', 'left_leg', '--radian', '0'], 'unknown option --radian; did you mean --radians?'),
+    (['pose', 'left_leg', '-degrees', '0'], 'unknown option -degrees; did you mean --degrees?'),
+    (['pose', 'left_leg', '--deg=0'], 'unknown option --deg; did you mean --degrees?'),
+    (['plot', 'x.csv', '--ouput', 'y'], 'unknown option --ouput; did you mean --output?'),
+    (['demo', '--colour'], 'unknown option --colour (see'),
+    (['pos', 'left_leg'], "unknown command 'pos'; did you mean 'pose'? known: list, pose"),
+    (['urdf', '--version', 'v9'], "unknown version 'v9'; did you mean 'v1'? known: v1, v2_5, v3, v2"),
+])
+def test_what_is_misspelt_is_named_with_what_is_near(words, complaint):
+    assert_one_line_complaint(leg_fk(*words), complaint)
+
+
+@pytest.mark.parametrize(('line', 'offered'), [
+    ('leg_fk po', {'pose'}), ('leg_fk pose --deg', {'--degrees'}),
+    ('leg_fk pose left', {'left_leg'}),
+    ('leg_fk pose left_leg --version v2', {'v2', 'v2_5'})])
+def test_the_shell_is_offered_commands_options_chains_and_versions(line, offered, tmp_path):
+    pytest.importorskip('argcomplete')
+    answer = tmp_path / 'answer'
+    leg_fk(environment={'_ARGCOMPLETE': '1', 'COMP_LINE': line, 'COMP_POINT': str(len(line)),
+                        '_ARGCOMPLETE_IFS': '\n', '_ARGCOMPLETE_STDOUT_FILENAME': str(answer)})
+    assert {word.strip() for word in answer.read_text().splitlines()} == offered

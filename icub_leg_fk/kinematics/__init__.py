@@ -4,13 +4,25 @@ Transforms are `T_a_b`, taking coordinates in b to coordinates in a; lengths are
 radians, quaternions (x, y, z, w).
 """
 
+from importlib import import_module
+from typing import Any, TYPE_CHECKING
+
 from icub_leg_fk.kinematics.catalog import Catalog, config_file, load_chain
 from icub_leg_fk.kinematics.chain import Chain
 from icub_leg_fk.kinematics.link import DHLink
 from icub_leg_fk.kinematics.rotation import matrix_to_quaternion, quaternion_to_matrix
-from icub_leg_fk.kinematics.urdf import chain_from_urdf, Urdf
+
+if TYPE_CHECKING:
+    from icub_leg_fk.kinematics.urdf import chain_from_urdf, Urdf
 
 __all__ = [
     'Catalog', 'Chain', 'DHLink', 'Urdf', 'chain_from_urdf', 'config_file', 'load_chain',
     'matrix_to_quaternion', 'quaternion_to_matrix',
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Import what reads URDFs only when it is needed."""
+    if name in ('chain_from_urdf', 'Urdf'):
+        return getattr(import_module('icub_leg_fk.kinematics.urdf'), name)
+    raise AttributeError(f'module {__name__!r} has no attribute {name!r}')

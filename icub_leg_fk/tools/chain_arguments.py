@@ -32,12 +32,30 @@ def add_json(parser: argparse.ArgumentParser) -> None:
 
 def add_chain(parser: argparse.ArgumentParser) -> None:
     """Add the chain, `--version`, `--foot-frame` and the kinematics file."""
-    parser.add_argument('chain', metavar='CHAIN',
-                        help='a chain of the kinematics file, such as left_leg (see leg_fk list)')
-    parser.add_argument('--version', metavar='VERSION',
-                        help='version of the chain (default: v2_5, if the chain has it)')
+    chain = parser.add_argument(
+        'chain', metavar='CHAIN',
+        help='a chain of the kinematics file, such as left_leg (see leg_fk list)')
+    version = parser.add_argument(
+        '--version', metavar='VERSION',
+        help='version of the chain (default: v2_5, if the chain has it)')
+    # What argcomplete offers in the shell.
+    setattr(chain, 'completer', _known_chains)  # noqa: B010
+    setattr(version, 'completer', _known_versions)  # noqa: B010
     add_foot_frame(parser)
     add_kinematics_file(parser)
+
+
+def _known_chains(**_: object) -> list[str]:
+    from icub_leg_fk.kinematics import Catalog
+
+    return [*Catalog.load().chains]
+
+
+def _known_versions(**_: object) -> list[str]:
+    from icub_leg_fk.kinematics import Catalog
+
+    return [*dict.fromkeys(version for entry in Catalog.load().chains.values()
+                           for version in entry.versions)]
 
 
 def add_foot_frame(parser: argparse.ArgumentParser) -> None:

@@ -1,3 +1,4 @@
+# PYTHON_ARGCOMPLETE_OK
 """The `leg_fk` command: one subcommand per module of this package.
 
 A subcommand's module has `HELP` (one line), `EXAMPLES`, `add_arguments(parser)` and `run(args)`,
@@ -17,7 +18,7 @@ import sys
 from typing import Any, NoReturn
 
 from icub_leg_fk import __version__
-from icub_leg_fk.errors import LegFKError
+from icub_leg_fk.errors import LegFKError, near, UnknownNameError
 
 MODULES = {
     'list': 'list_chains',
@@ -80,11 +81,28 @@ class CommandParser(Parser):
         """Parse the arguments."""
         if self._mixing:  # argparse comes back here for each of its two passes
             return super().parse_known_args(args, namespace)
+        self._refuse_unknown_options(args or ())
         self._mixing = True
         try:
             return self.parse_known_intermixed_args(args, namespace)
         finally:
             self._mixing = False
+
+
+    def _refuse_unknown_options(self, words: Sequence[str]) -> None:
+        """Name an option that does not exist; argparse would miss a required one instead."""
+        known = self._option_string_actions
+        for word in words:
+            if word == '--':
+                return
+            option = word.partition('=')[0]
+            if (not word.startswith('-') or word == '-' or option in known
+                    or (word[:2] in known and not word.startswith('--'))):
+                continue
+            guess = near(option, known) or next(
+                (name for name in known if name.startswith('--') and name.startswith(option)), '')
+            hint = f'; did you mean {guess}?' if guess else ''
+            self.error(f'unknown option {option}{hint}')
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -97,6 +115,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         The exit status: 0, or 2 after a mistake, which is told in one line on stderr.
     """
     words = sys.argv[1:] if argv is None else list(argv)
+    if '_ARGCOMPLETE' in os.environ:
+        from argcomplete import autocomplete  # which set that variable
+        autocomplete(_parser([]))
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors='backslashreplace')  # a terminal that is not UTF-8
     try:
@@ -118,6 +139,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(words: list[str]) -> int:
     parser = _parser(words)
+    if not words:
+        parser.print_help()
+        return 0
     try:
         args = parser.parse_args(words)
     except SystemExit as done:  # -h and --version
@@ -132,6 +156,8 @@ def _parser(words: Sequence[str]) -> Parser:
     subparsers = parser.add_subparsers(title='commands', metavar='COMMAND', required=True,
                                        parser_class=CommandParser)
     chosen = next((word for word in words if not word.startswith('-')), '')
+    if chosen and chosen not in MODULES and not words[0].startswith('-'):
+        raise UnknownNameError('command', chosen, MODULES)
     for name in (chosen,) if chosen in MODULES else MODULES:
         module = import_module(f'icub_leg_fk.tools.{MODULES[name]}')
         subparser = subparsers.add_parser(

@@ -45,6 +45,8 @@ def run(args: argparse.Namespace) -> int:
     q = joint_positions(args, chain) or []
     T = chain.forward(q) + 0.0  # no negative zeros
     quaternion = matrix_to_quaternion(T[:3, :3])
+    if quaternion @ chain.pose(q)[3:] < 0.0:  # of the two the one nearer to that at q = 0
+        quaternion = 0.0 - quaternion
     if args.json:
         print(json_text({
             'chain': chain.name, 'version': chain.version, 'root_frame': chain.root_frame,

@@ -12,6 +12,7 @@ from icub_leg_fk.errors import LegFKError
 from icub_leg_fk.kinematics import Chain, DHLink
 
 WIDTH = 98
+_UNLIKELY = 10.0  # m; of a joint's position, which may have been meant in mm
 
 Rows = Sequence[Sequence[str]]
 
@@ -47,10 +48,13 @@ def position_in(link: DHLink, position: float) -> tuple[float, int]:
 
 
 def range_notes(chain: Chain, q: Sequence[float]) -> list[str]:
-    """Return a note for each joint that is outside its range."""
+    """Return a note for each joint that is outside its range, or hardly in metres."""
     outside = chain.out_of_range(q)
     notes = []
     for name, link, value in zip(chain.joint_names, chain.joints, q, strict=True):
+        if link.is_prismatic and abs(value) >= _UNLIKELY:
+            notes.append(f'note: {name} = {position_text(link, value)}: positions of prismatic '
+                         'joints are in metres; is it meant?')
         if name in outside:
             erratum = f' (known erratum of the table: {link.erratum})' if link.erratum else ''
             notes.append('\n'.join(wrapped(

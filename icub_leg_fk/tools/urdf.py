@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from icub_leg_fk.errors import LegFKError
+from icub_leg_fk.errors import LegFKError, UnknownNameError
 from icub_leg_fk.tools.chain_arguments import (
     add_chain_version,
     add_kinematics_file,
@@ -73,8 +73,9 @@ def _selections(catalog: Catalog, args: argparse.Namespace) -> list[Selection]:
         name for name, entry in catalog.chains.items()
         if name in versions or args.version in entry.versions]
     if not names:
-        raise LegFKError(f'no chain has version {args.version!r}: give --version or '
-                         '--chain-version')
+        known = dict.fromkeys(version for entry in catalog.chains.values()
+                              for version in entry.versions)
+        raise UnknownNameError('version', args.version, known)
     selections = []
     for name in names:
         chain = catalog.chain(name, versions.get(name, args.version))
