@@ -30,7 +30,7 @@ class _Run(NamedTuple):
 
 def measure_bag(report: Report, quick: bool) -> None:
     """Add speed, memory and two jobs."""
-    short, long, jobs_length, rounds = (1, 2, 2, 1) if quick else (10, 40, 120, 3)
+    short, long, jobs_length, rounds = (1, 2, 2, 1) if quick else (10, 90, 120, 3)
     runs: dict[str, list[_Run]] = {'short': [], 'ours': [], 'plain': [], 'twists': []}
     jobs: dict[int, list[float]] = {1: [], 2: []}
     with TemporaryDirectory(prefix='bench_bag_') as directory:
