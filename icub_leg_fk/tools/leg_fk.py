@@ -88,7 +88,6 @@ class CommandParser(Parser):
         finally:
             self._mixing = False
 
-
     def _refuse_unknown_options(self, words: Sequence[str]) -> None:
         """Name an option that does not exist; argparse would miss a required one instead."""
         known = self._option_string_actions
