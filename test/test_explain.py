@@ -120,7 +120,7 @@ def test_a_prismatic_arm_is_explained_as_the_textbook_has_it():
     # T_03 of Spong, Hutchinson and Vidyasagar's example 3.2, with d_1 = 400 and their d_2, d_3.
     assert text.count('T_RoE = T_Ro0 T_03 =') == 1
     rows = [' '.join(row.split()) for row in re.findall(r'\[([^]]*)\]', text)[-4:]]
-    assert rows == ['c_0 0 -s_0 -s_0 d_2', 's_0 0 c_0 c_0 d_2', '0 -1 0 d_1 + 400', '0 0 0 1']
+    assert rows == ['c_0 0 -s_0 -d_2 s_0', 's_0 0 c_0 c_0 d_2', '0 -1 0 d_1 + 400', '0 0 0 1']
     assert 'd_2      = q_2 + 150' in text and 'lift slides along it' in text
 
 

@@ -78,7 +78,7 @@ def test_radians_that_are_whole_degrees_are_recognised():
 def test_parallel_axes_add_their_angles():
     text = explain('left_leg')
     assert 'c_3m4    = cos(theta_3 - theta_4)' in text
-    assert 'r_23 = c_1 c_3m4 - s_1 c_2 s_3m4' in text
+    assert 'r_23 = c_1 c_3m4 - c_2 s_1 s_3m4' in text
     assert 'c_123    = cos(theta_1 + theta_2 + theta_3)' in explain(
         'ur5', '-k', EXAMPLES / 'ur5.yaml', '--version', 'series_3')
 

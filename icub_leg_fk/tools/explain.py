@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import math
+from typing import Any, TYPE_CHECKING
 
 from icub_leg_fk.tools.chain_arguments import (
     add_chain,
@@ -10,6 +12,9 @@ from icub_leg_fk.tools.chain_arguments import (
     joint_positions,
     load_chain,
 )
+
+if TYPE_CHECKING:
+    from icub_leg_fk.tools.explain_steps import Cell, Explanation, Matrix, Step
 
 HELP = 'explain a chain: DH table, each A_i, products, answer'
 EXAMPLES = """\
@@ -36,20 +41,70 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the explanation."""
-    from icub_leg_fk.tools.explaining.steps import Algebra, Decimals, explanation
+    from icub_leg_fk.tools.explain_document import document, Latex, Text
+    from icub_leg_fk.tools.explain_steps import work_out
+    from icub_leg_fk.tools.text import json_text
 
     catalog, chain = load_chain(args)
     q = joint_positions(args, chain)
-    algebra: Algebra = Decimals()
-    if args.symbolic or q is None:
-        from icub_leg_fk.tools.explaining.symbolic import Exact
-        algebra = Exact()
-    e = explanation(catalog.entry(chain.name), chain, args.foot_frame, q, algebra)
-    if args.json:
-        from icub_leg_fk.tools.explaining.json_form import explanation_json as render
-    elif args.latex:
-        from icub_leg_fk.tools.explaining.latex import explanation_latex as render
-    else:
-        from icub_leg_fk.tools.explaining.text import explanation_text as render
-    print(render(e))
+    version = catalog.entry(chain.name).versions[chain.version]
+    e = work_out(version, chain, args.foot_frame, q, args.symbolic)
+    print(json_text(_as_json(e)) if args.json
+          else document(e, Latex(e) if args.latex else Text(e)))
     return 0
+
+
+def _as_json(e: Explanation) -> dict[str, Any]:
+    """Return the explanation for programs; lengths in mm, angles in rad."""
+    chain = e.chain
+    return {
+        'chain': chain.name,
+        'version': chain.version,
+        'source': e.source,
+        'root_frame': chain.root_frame,
+        'tip_frame': chain.tip_frame,
+        'units': {'length': 'mm', 'angle': 'rad'},
+        'convention': chain.convention,
+        'joints': list(chain.joint_names),
+        'joint_positions': None if e.q is None else [
+            1000 * value if link.is_prismatic else value
+            for value, link in zip(e.q, chain.joints, strict=True)],
+        'symbols': {name: str(meaning) for name, meaning in e.symbols.items()},
+        'frames': [{'origin': T[:3, 3].tolist(), 'x': T[:3, 0].tolist(), 'y': T[:3, 1].tolist(),
+                    'z': T[:3, 2].tolist()} for T in (frame + 0.0 for frame in e.frames.values())],
+        'frame_names': list(e.frames),
+        'links': [_link(step, e.is_modified) for step in e.steps],
+        'running_products': [_matrix(step.T_0) for step in e.steps],
+        'T_root_0': _matrix(e.T_root_0),
+        'after_last_link': {name: _matrix(T) for name, T in e.tips},
+        'T_root_tip': _matrix(e.T_root_tip),
+    }
+
+
+def _link(step: Step, modified: bool) -> dict[str, Any]:
+    link = step.link
+    lower, upper = link.limits
+    scale = 1000 if link.is_prismatic else 1
+    names = ('Rx', 'tx', 'Rz', 'tz') if modified else ('Rz', 'tz', 'tx', 'Rx')
+    return {
+        'i': step.index,
+        'joint': step.joint or None,
+        'joint_type': link.joint_type,
+        'range': [scale * lower, scale * upper] if math.isfinite(lower) else None,
+        'erratum': link.erratum,
+        'theta': _cell(step.theta), 'd': _cell(step.d), 'a': _cell(step.a),
+        'alpha': _cell(step.alpha),
+        'factors': {name: _matrix(T) for name, T in zip(names, step.factors, strict=True)},
+        'A': _matrix(step.A),
+    }
+
+
+def _matrix(T: Matrix) -> list[list[float]] | list[list[str]]:
+    """Return a matrix of numbers, or one of expressions if any entry is one."""
+    if all(isinstance(cell, (int, float)) for row in T for cell in row):
+        return [[float(cell) + 0.0 for cell in row] for row in T]
+    return [[str(cell) for cell in row] for row in T]
+
+
+def _cell(cell: Cell) -> float | str:
+    return cell + 0.0 if isinstance(cell, (int, float)) else str(cell)

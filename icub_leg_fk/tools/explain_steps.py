@@ -1,0 +1,320 @@
+"""What `leg_fk explain` tells: the Denavit-Hartenberg method, worked out for one chain.
+
+Lengths are millimetres here, as in the printed tables. Rows count from i = 0, so row i is the
+transform A_i = T_i(i+1) = Rz(theta_i) tz(d_i) tx(a_i) Rx(alpha_i) from frame i+1 to frame i; in
+Craig's convention it is Rx(alpha_i) tx(a_i) Rz(theta_i) tz(d_i).
+
+An entry of a matrix is a float, or where the answer is to be exact a sympy expression, with c_i
+and s_i for cosine and sine of theta_i. Every product is linear in each joint's c_i and s_i, so
+nothing needs simplifying, but for joints with parallel axes: Rz(theta_3) Rx(pi) Rz(theta_4) is
+Rz(theta_3 - theta_4) Rx(pi). Such angles are added up while multiplying, and appear as c_34 and
+s_34, or c_3m4 and s_3m4 for a difference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+import math
+from typing import Any
+
+from icub_leg_fk.errors import MissingDependencyError
+from icub_leg_fk.kinematics import Chain
+from icub_leg_fk.kinematics.catalog import ChainVersion
+from icub_leg_fk.kinematics.chain import modified_rows
+from icub_leg_fk.kinematics.link import DHLink
+from icub_leg_fk.kinematics.rotation import Array, cos_sin
+import numpy as np
+
+Cell = Any
+Matrix = list[list[Cell]]
+
+# How the iCub's documentation calls the tips; another robot's are E and, with a sole, S.
+_TIP_SYMBOLS = {'left_foot': ('Lf', 'Ls'), 'right_foot': ('Rf', 'Rs'), 'head_imu': ('Is', '')}
+
+
+@dataclass(frozen=True)
+class Step:
+    """What row `index` contributes: its values, A_i with its four factors, and T_0(i+1)."""
+
+    index: int
+    joint: str  # empty for a fixed row
+    link: DHLink
+    theta: Cell
+    d: Cell
+    a: Cell
+    alpha: Cell
+    factors: tuple[Matrix, ...]
+    A: Matrix
+    T_0: Matrix
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """One chain explained.
+
+    Attributes:
+        chain: the chain.
+        tip: symbol of its tip, as in T_RoLf.
+        source: where the table comes from, if it is not the printed documentation.
+        q: the joint vector [rad or m]; None where the joints stay symbols.
+        T_root_0: where frame 0 stands in the root frame.
+        steps: one per row.
+        tips: what follows the last row: name and matrix of T_nIs and of the sole.
+        T_root_tip: the answer.
+        symbols: what each symbol stands for; empty with numbers.
+        frames: frames in the root frame [mm] by name, 0 to m and those of the tips, for q or for
+            q = 0.
+    """
+
+    chain: Chain
+    tip: str
+    source: str
+    q: Sequence[float] | None
+    T_root_0: Matrix
+    steps: list[Step]
+    tips: list[tuple[str, Matrix]]
+    T_root_tip: Matrix
+    frames: dict[str, Array]
+    symbols: dict[str, Cell] = field(default_factory=dict)
+
+    @property
+    def is_modified(self) -> bool:
+        """Whether the table is in Craig's convention."""
+        return self.chain.convention == 'modified'
+
+    def value(self, cell: Cell) -> float | None:
+        """Return the value of an entry; None if it depends on a joint without one."""
+        if isinstance(cell, (int, float)):
+            return float(cell)
+        value = cell.subs(list(self.symbols.items())).evalf()
+        return float(value) if value.is_number else None
+
+
+class Decimals:
+    """The arithmetic in floats."""
+
+    def __init__(self) -> None:
+        self.symbols: dict[str, Cell] = {}
+
+    def number(self, value: float) -> Cell:
+        """Return a number as it is computed with."""
+        return value
+
+    def mm(self, metres: float) -> Cell:
+        """Return a length in mm."""
+        return 1000 * metres
+
+    def angle(self, radians: float) -> Cell:
+        """Return an angle."""
+        return radians
+
+    def joint(self, index: int, link: DHLink, q: float | None) -> tuple[Cell, Cell]:
+        """Return theta [rad] and d [mm] of a row."""
+        moved = link.sign * (q or 0.0)
+        slid, turned = (moved, 0.0) if link.is_prismatic else (0.0, moved)
+        return link.offset + turned, 1000 * (link.d + slid)
+
+    def cos_sin(self, index: int, theta: Cell) -> tuple[Cell, Cell]:
+        """Return cosine and sine of a row's theta."""
+        return cos_sin(theta)
+
+    def cos_sin_constant(self, angle: Cell) -> tuple[Cell, Cell]:
+        """Return cosine and sine of an angle that is no joint's."""
+        return cos_sin(angle)
+
+    def running_products(self, steps: Sequence[Step], modified: bool) -> list[Matrix]:
+        """Return T_01, T_02, ... T_0m."""
+        products = [steps[0].A]
+        for step in steps[1:]:
+            products.append(product(products[-1], step.A))
+        return products
+
+
+class Exact(Decimals):
+    """The arithmetic in sympy's expressions; keeps the meaning of every symbol in `symbols`.
+
+    Cosines and sines of a number are exact as long as they are as simple as sqrt(3)/2; the cosine
+    of 100 degrees stays c_i, since its powers would fill pages.
+    """
+
+    def __init__(self) -> None:
+        try:
+            import sympy
+        except ImportError as error:
+            raise MissingDependencyError(
+                'sympy is not installed: exact and symbolic answers need it (pip install sympy, '
+                'rosdep key python3-sympy); decimal ones do not, give --degrees or --radians'
+            ) from error
+        super().__init__()
+        self._sympy = sympy
+        self._thetas: dict[int, Cell] = {}
+
+    def number(self, value: float) -> Cell:
+        """Return the fraction that was printed."""
+        return self._sympy.Rational(Fraction(repr(value)))
+
+    def mm(self, metres: float) -> Cell:
+        """Return a length in mm as the fraction that was printed."""
+        return self._sympy.Rational(Fraction(f'{1000 * metres:.12g}'))
+
+    def angle(self, radians: float) -> Cell:
+        """Return an angle as a part of pi if its degrees have at most four decimals, to 1e-12."""
+        degrees = Fraction(f'{math.degrees(radians):.12g}')
+        if 10_000 % degrees.denominator == 0:
+            return self._sympy.pi * self._sympy.Rational(degrees) / 180
+        return self.number(radians)
+
+    def joint(self, index: int, link: DHLink, q: float | None) -> tuple[Cell, Cell]:
+        """Return theta and d of a row; a joint without a value brings its symbol."""
+        theta, d = self.angle(link.offset), self.mm(link.d)
+        symbol = self._sympy.Symbol(f'q_{index}')
+        if link.is_prismatic:
+            d = (self._define(f'd_{index}', link.sign * symbol + d) if q is None
+                 else d + link.sign * self.mm(q))
+        elif not link.is_fixed:
+            theta = (self._define(f'theta_{index}', link.sign * symbol + theta) if q is None
+                     else theta + link.sign * self.angle(q))
+        return theta, d
+
+    def cos_sin(self, index: int, theta: Cell) -> tuple[Cell, Cell]:
+        """Return cosine and sine of a row's theta: c_i and s_i if it is a symbol."""
+        self._thetas[index] = theta
+        return self._cos_sin_sum([(index, 1)])
+
+    def cos_sin_constant(self, angle: Cell) -> tuple[Cell, Cell]:
+        """Return cosine and sine of an angle that is no joint's."""
+        return self._sympy.cos(angle), self._sympy.sin(angle)
+
+    def running_products(self, steps: Sequence[Step], modified: bool) -> list[Matrix]:
+        """Return T_01, T_02, ... T_0m, with the angles of joints on parallel axes added up."""
+        zero, one = self._sympy.Integer(0), self._sympy.Integer(1)
+        products: list[Matrix] = []
+        base: Matrix | None = None
+        turned: list[tuple[int, int]] = []  # joints since base, and the sense of each
+        x, y, z, sense = zero, zero, zero, 1  # translation since base; -1 once z points back
+
+        def behind(ca: Cell, sa: Cell) -> Matrix:
+            c, s = self._cos_sin_sum(turned) if turned else (one, zero)
+            within = [[c, -s * ca, s * sa, x], [s, c * ca, -c * sa, y], [zero, sa, ca, z],
+                      [0, 0, 0, 1]]
+            T = within if base is None else product(base, within)
+            return [[self._sympy.expand(cell) for cell in row] for row in T]
+
+        for step in steps:
+            for part in ('link', 'joint') if modified else ('joint', 'link'):
+                if part == 'joint':
+                    turned.append((step.index, sense))
+                    z += sense * step.d
+                    continue
+                c, s = self._cos_sin_sum(turned) if turned else (one, zero)
+                x, y = x + c * step.a, y + s * step.a
+                ca, sa = (sense * value for value in self.cos_sin_constant(step.alpha))
+                if sa == 0:
+                    sense = int(ca)
+                else:
+                    base, turned = behind(ca, sa), []
+                    x, y, z, sense = zero, zero, zero, 1
+            products.append(base if base is not None and not turned and not (x or y or z)
+                            and sense == 1 else behind(sense * one, zero))
+        return products
+
+    def _cos_sin_sum(self, turned: Sequence[tuple[int, int]]) -> tuple[Cell, Cell]:
+        """Return cosine and sine of a sum of thetas: numbers if they are simple, else symbols."""
+        angles = [(index, sense * self._thetas[index]) for index, sense in turned]
+        joints = [index for index, angle in angles if not angle.is_number]
+        constant = sum((angle for _, angle in angles if angle.is_number),
+                       start=self._sympy.Integer(0))
+        cc, sc = self.cos_sin_constant(constant)
+        if not joints and (cc.is_Rational or sc.is_Rational or cc == sc or cc == -sc):
+            return cc, sc
+        if not joints:  # cos(100 deg) is not simple; the angle itself may be a symbol's
+            joints, constant, cc, sc = [index for index, _ in angles], 0, 1, 0
+        total = sum(angle for index, angle in angles if index in joints)
+        senses = dict(turned)
+        name = ('_' if max(self._thetas) > 9 else '').join(  # c_12 or c_1_2; c_1m2
+            f'{"m" if senses[index] < 0 else ""}{index}' for index in joints)
+        c = self._define(f'c_{name}', self._sympy.cos(total, evaluate=False))
+        s = self._define(f's_{name}', self._sympy.sin(total, evaluate=False))
+        return c * cc - s * sc, s * cc + c * sc
+
+    def _define(self, name: str, meaning: Cell) -> Cell:
+        self.symbols[name] = meaning
+        return self._sympy.Symbol(name)
+
+
+def work_out(version: ChainVersion, chain: Chain, foot_frame: str | None,
+             q: Sequence[float] | None, exact: bool) -> Explanation:
+    """Work a chain out, step by step.
+
+    Args:
+        version: the chain's version in its catalog.
+        chain: the chain with the tip frame asked for.
+        foot_frame: that tip frame, `dh` or `sole`; the first if None.
+        q: joint vector [rad or m], or None to keep the joints as symbols.
+        exact: whether numbers stay exact; they do where joints are symbols.
+
+    Raises:
+        MissingDependencyError: the answer is to be exact and sympy is not installed.
+    """
+    algebra = Exact() if exact or q is None else Decimals()
+    steps = _steps(chain, q, algebra)
+    tip, sole = _TIP_SYMBOLS.get(chain.tip, ('E', 'S'))
+    tips = []
+    if not np.array_equal(version.T_n_tip, np.eye(4)):
+        tips.append((f'T_n{tip}', version.T_n_tip))
+    T_dh_tip = version.tip_frames[foot_frame or next(iter(version.tip_frames))].T_dh_tip
+    if not np.array_equal(T_dh_tip, np.eye(4)):
+        tips.append((f'T_{tip}{sole}', T_dh_tip))
+        tip = sole
+    T: Array = np.array(_matrix(chain.T_root_0, Decimals()))
+    frames = {'0': T}
+    for step in _steps(chain, [0.0] * chain.n if q is None else q, Decimals()):
+        T = frames[str(step.index + 1)] = T @ np.array(step.A)
+    for name, placed in tips:
+        T = frames[name[3:]] = T @ np.array(_matrix(placed, Decimals()))
+    exact_tips = [(name, _matrix(placed, algebra)) for name, placed in tips]
+    T_root_0 = _matrix(chain.T_root_0, algebra)
+    T_root_tip = product(T_root_0, steps[-1].T_0)
+    for _, matrix in exact_tips:
+        T_root_tip = product(T_root_tip, matrix)
+    return Explanation(chain, tip, version.source, q, T_root_0, steps, exact_tips, T_root_tip,
+                       frames, algebra.symbols)
+
+
+def product(A: Matrix, B: Matrix) -> Matrix:
+    """Return the product of two 4x4 matrices of numbers or expressions."""
+    return [[sum((x * y for x, y in zip(row, column, strict=True)), start=0)
+             for column in zip(*B, strict=True)] for row in A]
+
+
+def _matrix(T: Array, algebra: Decimals) -> Matrix:
+    """Return a constant transform, whose translation is in metres, in mm."""
+    rows = [[algebra.number(value) for value in row] for row in T.tolist()]
+    for row, metres in zip(rows, T[:3, 3].tolist()):
+        row[3] = algebra.mm(metres)
+    return rows
+
+
+def _steps(chain: Chain, q: Sequence[float] | None, algebra: Decimals) -> list[Step]:
+    names = iter(chain.joint_names)
+    given: Iterator[float | None] = iter([None] * chain.n if q is None else q)
+    modified = chain.convention == 'modified'
+    steps = []
+    for i, link in enumerate(modified_rows(chain) if modified else chain.links):
+        joint, position = ('', 0.0) if link.is_fixed else (next(names), next(given))
+        theta, d = algebra.joint(i, link, position)
+        a, alpha = algebra.mm(link.a), algebra.angle(link.alpha)
+        (ct, st), (ca, sa) = algebra.cos_sin(i, theta), algebra.cos_sin_constant(alpha)
+        factors: tuple[Matrix, ...] = (
+            [[ct, -st, 0, 0], [st, ct, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]],
+            [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, d], [0, 0, 0, 1]],
+            [[1, 0, 0, a], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]],
+            [[1, 0, 0, 0], [0, ca, -sa, 0], [0, sa, ca, 0], [0, 0, 0, 1]])
+        if modified:
+            factors = (factors[3], factors[2], factors[0], factors[1])
+        A = product(product(*factors[:2]), product(*factors[2:]))
+        steps.append(Step(i, joint, link, theta, d, a, alpha, factors, A, A))
+    products = algebra.running_products(steps, modified)
+    return [replace(step, T_0=T) for step, T in zip(steps, products, strict=True)]
