@@ -126,15 +126,6 @@ def test_recording_is_played_in_its_own_timing():
     assert Path('walk.svg').is_file()
 
 
-def test_recorded_robot_can_be_played():
-    recording = Path(__file__).parents[2] / 'shared/data/icub_genova04_walking.csv'
-    if not recording.is_file():
-        pytest.skip(f'no {recording}')
-    done = demo('--recording', str(recording), '--seconds', '2')
-    assert done.returncode == 0, done.stderr
-    assert re.search(r'lost +none', done.stdout)
-
-
 @pytest.mark.parametrize(('version', 'foot_frame'), [('v1', 'dh'), ('v2_5', 'sole')])
 def test_poses_received_are_those_of_the_chains(version, foot_frame):
     """In the order of the messages, equal to the plain product of the DH matrices."""

@@ -1,7 +1,6 @@
 """`leg_fk explain` in decimals, and what holds of every form of it."""
 
 import json
-from pathlib import Path
 import re
 
 from explain_cases import (
@@ -15,8 +14,6 @@ from explain_cases import (
 from leg_fk_process import assert_one_line_complaint, leg_fk
 import numpy as np
 import pytest
-
-SPEC = Path(__file__).parent.parent.parent / 'shared' / 'spec' / '001_055926a478fe2c09.txt'
 
 
 @every_chain
@@ -75,29 +72,6 @@ def test_at_zero_the_text_ends_with_the_documented_position(words, position):
     text = explain(*words, '--degrees', *[0] * 6)
     x, y, z = position
     assert f'is at x = {x:g}, y = {y:g}, z = {z:g} mm in root_link.' in text.splitlines()[-1]
-
-
-ROW = re.compile(r'i = (?P<i>\d) +(?P<a>\S+) +(?P<d>\S+) +(?P<alpha>\S+) +'
-                 r'((?P<offset>\S+) \+ )?\(?(?P<lower>-?\d+) ?- ?> ?\+?(?P<upper>-?\d+)\)?')
-
-
-def table(text):
-    return [match.groupdict(default='0') for match in ROW.finditer(text)]
-
-
-@pytest.mark.skipif(not SPEC.exists(), reason='the documents of the robot are not here')
-@pytest.mark.parametrize(('heading', 'following', 'words'), [
-    ('Left-V1', 'Left-V2_5', ['left_leg', '--version', 'v1']),
-    ('Left-V2_5', 'Right-V1', ['left_leg', '--version', 'v2_5']),
-    ('Right-V1', 'Right-V2_5', ['right_leg', '--version', 'v1']),
-    ('Right-V2_5', None, ['right_leg', '--version', 'v2_5'])])
-def test_the_table_is_the_printed_one(heading, following, words):
-    _, _, document = SPEC.read_text(encoding='utf-8').partition(f'\n{heading}\n')
-    if following:
-        document, _, _ = document.partition(f'\n{following}\n')
-    printed = table(document)
-    assert len(printed) == 6
-    assert table(explain(*words, '--degrees', *[0] * 6)) == printed
 
 
 def test_numbers_stand_with_their_points_under_each_other():

@@ -2,17 +2,14 @@
 
 from geometry_msgs.msg import TwistStamped
 from icub_leg_fk.kinematics import Catalog
-from icub_leg_fk.tools.gait import walk
 from node_harness import BOTH, FEET, LOSSLESS, NodeProcess, Robot, SECOND
 from node_oracle import oracle_jacobian, oracle_pose, pose_matrix
 import numpy as np
 import pytest
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
-from recorded_walk import needs_recorded_walk, read_recorded_walk
 from visualization_msgs.msg import Marker, MarkerArray
 
 MS = 1_000_000  # ns
-RATE = 100  # Hz
 Q = np.array([0.2, 0.1, -0.1, -0.5, -0.3, 0.1, 0.15, 0.05, 0.1, -0.4, -0.2, -0.1])
 CHAINS = dict(zip(FEET, (('left_leg', slice(6)), ('right_leg', slice(6, 12))), strict=True))
 
@@ -84,58 +81,6 @@ def test_no_twist_without_all_velocities_but_the_pose_goes_out(twists, qdot):
     whole = len(qdot) == 12
     assert (bad in answers['left_foot'].stamps()) == (whole and np.isfinite(qdot[:6]).all())
     assert (bad in answers['right_foot'].stamps()) == (whole and np.isfinite(qdot[6:]).all())
-
-
-def rotation_vector(R):
-    """Return axis times angle [rad] of a rotation of less than 90 degrees."""
-    sine = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
-    length = np.linalg.norm(sine)
-    return sine * (np.arcsin(length) / length if length else 1.0)
-
-
-def check_against_differences(twists, positions, velocities, linear, angular):
-    """Check twists against central differences of the poses that come with them.
-
-    Args:
-        twists: the robot and its inboxes.
-        positions: (N, 12) joint positions [rad], at RATE.
-        velocities: (N, 12) joint velocities [rad/s].
-        linear: greatest difference allowed [m/s].
-        angular: greatest difference allowed [rad/s].
-    """
-    for q, qdot in zip(positions, velocities, strict=True):
-        twists.send(q, qdot)
-    poses, answers = twists.answers()
-    for tip in FEET:
-        T = np.array([pose_matrix(message.pose) for message in poses[tip]])
-        found = np.array([vector(message) for message in answers[tip]])
-        assert len(T) == len(found) == len(positions)
-        p, R = T[:, :3, 3], T[:, :3, :3]
-        expected = np.hstack((
-            (p[2:] - p[:-2]) * RATE / 2,
-            [rotation_vector(b @ a.T) * RATE / 2 for a, b in zip(R, R[2:])]))
-        error = np.abs(found[1:-1] - expected).max(axis=0)
-        assert np.abs(expected).max() > 10 * error.max()  # the robot does move
-        assert error[:3].max() < linear
-        assert error[3:].max() < angular
-
-
-def test_twist_is_the_derivative_of_the_pose_on_a_walk(twists):
-    gait = walk(Catalog.load(), 'v2_5', seconds=2.0, rate=RATE)
-    check_against_differences(twists, gait.positions, gait.velocities, 0.01, 0.02)
-
-
-@needs_recorded_walk
-def test_twist_is_the_derivative_of_the_pose_on_the_recorded_walk(twists):
-    names, times, recorded, _ = read_recorded_walk()
-    assert tuple(names) == BOTH
-    even = np.arange(4.0, 8.0, 1 / RATE)  # s, in the midst of the walk
-    positions = np.array([np.interp(even, times, column) for column in recorded.T]).T
-    window = np.hanning(9)[1:-1]  # 70 ms, against the encoders' steps
-    window /= window.sum()
-    smooth = np.array([np.convolve(column, window, 'valid') for column in positions.T]).T
-    velocities = np.gradient(smooth, 1 / RATE, axis=0)
-    check_against_differences(twists, smooth[1:-1], velocities[1:-1], 0.01, 0.02)
 
 
 def test_frame_prefix_holds_for_twists_and_topics_go_when_they_are_switched_off(twists):

@@ -143,14 +143,6 @@ def test_transforms_without_tf2_msgs_are_refused_in_one_line():
         pytest.skip(f'tf2_msgs is there: {tf2_msgs.__file__}')
 
 
-def test_broken_kinematics_file_is_one_line_with_its_place(tmp_path):
-    file = tmp_path / 'broken.yaml'
-    file.write_text('units: {length: mm, angle: deg}\nchains: [1, 2]\n')
-    done = run(f'-p kinematics_file:={file}')
-    assert (done.returncode, done.stdout, done.stderr.count('\n')) == (1, '', 1)
-    assert f'{file}:2' in done.stderr
-
-
 def wait_until_it_listens(node):
     """Wait until the node has its signal handlers, its first act.
 

@@ -74,14 +74,6 @@ def texts_in(svg):
         '}text')]
 
 
-@pytest.mark.parametrize(('name', 'start'), [
-    ('feet.png', b'\x89PNG'), ('feet.svg', b'<?xml'), ('feet.pdf', b'%PDF')])
-def test_draws_every_format(walking_csv, name, start):
-    assert main(['plot', 'walking.csv', '-o', name]) == 0
-    assert Path(name).read_bytes().startswith(start)
-    assert [path.name for path in Path().iterdir() if path.name not in (name, 'walking.csv')] == []
-
-
 def test_default_name_is_the_inputs_in_the_present_directory(walking_csv, tmp_path, monkeypatch):
     (tmp_path / 'elsewhere').mkdir()
     monkeypatch.chdir(tmp_path / 'elsewhere')
@@ -232,21 +224,6 @@ def test_any_chain_of_any_file_can_be_drawn(tmp_path, monkeypatch):
         [','.join(['time', *joints]), *(f'{t},0.1,0,{t / 10},0,0.2,0' for t in range(9))]))
     assert main(['plot', 'head.csv', '--chains', 'head_imu', '--version', 'v2']) == 0
     assert Path('head.png').stat().st_size > 10_000
-
-
-def test_chains_may_have_a_version_of_their_own(walking_csv):
-    joints = Catalog.load().chain('head_imu', 'v2').joint_names
-    header, *rows = walking_csv.read_text().splitlines()
-    Path('all.csv').write_text('\n'.join(
-        [','.join([header, *joints]), *(f'{row},0.1,0,0,0,0.2,0' for row in rows)]))
-    assert main(['plot', 'all.csv', '--chains', 'left_leg', 'head_imu',
-                 '--chain-version', 'head_imu=v2']) == 0
-
-
-def test_one_row_is_enough(walking_csv):
-    lines = walking_csv.read_text().splitlines()
-    Path('one.csv').write_text('\n'.join(lines[:2]))
-    assert main(['plot', 'one.csv']) == 0
 
 
 def test_existing_picture_is_replaced_only_when_forced(walking_csv, capsys):

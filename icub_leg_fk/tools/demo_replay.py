@@ -78,28 +78,35 @@ class NodeProcess:
             words += ['-p', f'{name}:={value}']
         self._words = (sys.executable, '-m', 'icub_leg_fk.ros.main', *words)
         self._log = tempfile.TemporaryFile()
+        self._process: subprocess.Popen[bytes] | None = None
 
     def __enter__(self) -> NodeProcess:
-        # A session of its own: Ctrl-C reaches the demonstration alone, which then stops the node.
-        self._process = subprocess.Popen(
-            self._words, stdin=subprocess.DEVNULL, stdout=self._log, stderr=self._log,
-            start_new_session=True)
+        try:
+            with held_signals():  # the node must not get away between its start and the next line
+                # A session of its own: Ctrl-C reaches the demonstration, which stops the node.
+                self._process = subprocess.Popen(
+                    self._words, stdin=subprocess.DEVNULL, stdout=self._log, stderr=self._log,
+                    start_new_session=True)
+        except BaseException:
+            self.__exit__()
+            raise
         return self
 
     def __exit__(self, *_: object) -> None:
         with held_signals():
-            if self._process.poll() is None:
-                self._process.send_signal(signal.SIGINT)
-            try:
-                self._process.wait(_STOP_TIMEOUT)
-            except subprocess.TimeoutExpired:
-                self._process.kill()
-                self._process.wait()
+            if self._process is not None:
+                if self._process.poll() is None:
+                    self._process.send_signal(signal.SIGINT)
+                try:
+                    self._process.wait(_STOP_TIMEOUT)
+                except subprocess.TimeoutExpired:
+                    self._process.kill()
+                    self._process.wait()
             self._log.close()
 
     def check(self) -> None:
         """Raise the error if the node has stopped by itself."""
-        if (status := self._process.poll()) is not None:
+        if self._process is not None and (status := self._process.poll()) is not None:
             self._log.seek(0)
             said = self._log.read().decode(errors='replace').strip() or 'it said nothing'
             raise DemoError(f'the node stopped with exit status {status}: '
