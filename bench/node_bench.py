@@ -6,7 +6,6 @@ meets all of them; every ratio is of two stretches that followed one another.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from contextlib import closing, ExitStack
 
 from bench.node_process import Bench, NodeProcess, POSES, Stretch, TWISTS
@@ -20,11 +19,10 @@ _COMPARED = ('floor', 'ours', 'plain')
 
 
 def measure_node(report: Report, quick: bool) -> None:
-    """Add CPU, latency, memory, the first rate at which a pose is lost, and the start."""
+    """Add CPU, latency, memory, and the first rate at which a pose is lost."""
     with closing(Bench()) as bench:
         _measure_side_by_side(report, bench, *((2, 50) if quick else (12, 1000)))
         _measure_saturation(report, bench, quick)
-        _measure_starts(report, bench, 1 if quick else 8)
 
 
 def _measure_side_by_side(report: Report, bench: Bench, rounds: int, messages: int) -> None:
@@ -34,9 +32,8 @@ def _measure_side_by_side(report: Report, bench: Bench, rounds: int, messages: i
             'ours': NodeProcess('ours', 'ours'),
             'plain': NodeProcess('plain', 'plain'),
             'twists': NodeProcess('twists', 'ours', (*POSES, *TWISTS), ('publish_twist:=true',)),
-            'bare': NodeProcess('bare', 'bare', ()),
         }.items()}
-        _match(bench, nodes.values())
+        bench.match([*nodes.values()])
         turns: dict[str, list[Stretch]] = {name: [] for name in (*_COMPARED, 'twists')}
         for turn in range(rounds):  # forth and back, so that none is always first
             for name in turns if turn % 2 == 0 else reversed(turns):
@@ -60,14 +57,14 @@ def _measure_side_by_side(report: Report, bench: Bench, rounds: int, messages: i
         report.row(f'p99, {label}', p99[name], 'us')
     report.row('p50, here / floor', ratio(p50['ours'], p50['floor']), 'x', at_most=1.2)
     report.section('node: resident size')
-    report.row('bare rclpy node', [resident['bare']], 'MB')
-    report.row('here', [resident['ours']], 'MB')
+    for name in _COMPARED:
+        report.row('here' if name == 'ours' else name, [resident[name]], 'MB')
 
 
 def _measure_saturation(report: Report, bench: Bench, quick: bool) -> None:
     report.section('node: reliable QoS, every pose in order')
     with closing(NodeProcess('fast', 'ours').start()) as node:
-        _match(bench, [node])
+        bench.match([node])
         rate = 2000.0
         while rate < (2100.0 if quick else _FASTEST):
             stretch = bench.stretch(node, _JOINTS, rate, round(rate))
@@ -78,28 +75,3 @@ def _measure_saturation(report: Report, bench: Bench, quick: bool) -> None:
         else:
             report.note(f'none lost up to {rate / _RAMP:.0f} Hz')
         bench.forget(node)
-
-
-def _measure_starts(report: Report, bench: Bench, starts: int) -> None:
-    """Add the time from the start to the first pose.
-
-    Fast DDS announces a participant before that listens (RTPSParticipantImpl::enable). Who answers
-    too soon is not heard until it announces itself again, within 3 s; a third to a half of all
-    starts meet this, of any node. So this is no promise.
-    """
-    seconds: dict[str, list[float]] = {'bare rclpy node': [], 'here': []}
-    for turn in range(starts):
-        for label, name in (('bare rclpy node', 'bare'), ('here', 'ours')):
-            with closing(NodeProcess(f'start_{name}_{turn}', name)) as node:
-                seconds[label].append(bench.start_to_first_pose(node))
-                bench.forget(node)
-    report.section('node: start to first pose')
-    for label, readings in seconds.items():
-        report.row(label, readings, 's')
-
-
-def _match(bench: Bench, nodes: Iterable[NodeProcess]) -> None:
-    for node in nodes:
-        bench.watch(node)
-    for node in nodes:
-        bench.match(node)

@@ -1,8 +1,7 @@
 """The nodes that foot_pose_publisher is measured against: `python -m bench.reference_nodes NAME`.
 
-`bare` and `plain` are written as the rclpy tutorials show it: SingleThreadedExecutor and message
-objects. `floor` does the least that any Python node must do that answers a JointState with two
-PoseStamped.
+`plain` is written as the rclpy tutorials show it: SingleThreadedExecutor and message objects.
+`floor` does the least that any Python node must do that answers a JointState with two PoseStamped.
 """
 
 from __future__ import annotations
@@ -43,19 +42,6 @@ def floor(node: Node) -> None:
         executor.spin_once(timeout_sec=0.25)
 
 
-def bare(node: Node) -> None:
-    """Receive messages and relay their stamps."""
-    publishers = _publishers(node)
-
-    def relay(message: JointState) -> None:
-        for publisher in publishers:
-            pose = PoseStamped()
-            pose.header.stamp = message.header.stamp
-            publisher.publish(pose)
-    node.create_subscription(JointState, 'joint_states', relay, QOS)
-    _spin_plain(node)
-
-
 def plain(node: Node) -> None:
     """Compute with numpy, 4x4 matrix by 4x4 matrix."""
     from bench.plain import chains, foot_matrix, quaternion
@@ -93,7 +79,7 @@ def _spin_plain(node: Node) -> None:
         executor.spin_once(timeout_sec=0.25)
 
 
-NODES = {node.__name__: node for node in (bare, plain, floor)}
+NODES = {node.__name__: node for node in (plain, floor)}
 
 
 def main() -> None:

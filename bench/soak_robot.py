@@ -1,17 +1,17 @@
-"""A robot that behaves badly: joint states at a fixed rate, with a new fault every few seconds."""
+"""A robot that behaves badly: joint states at 1 kHz, with a new fault every two seconds."""
 
 from __future__ import annotations
 
+from collections import Counter, deque
 from collections.abc import Callable, Iterator
 import itertools
 import math
 import random
 import struct
 import time
-from typing import Any
+from typing import Any, NamedTuple
 
 from bench.joint_messages import joint_positions, ROBOT_JOINTS
-from bench.soak_ledger import Ledger, Promise
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from icub_leg_fk.kinematics import Catalog
 import rclpy
@@ -30,6 +30,8 @@ SAMPLES = 100  # of the gait
 SECOND = 1_000_000_000  # ns
 VERSIONS, FOOT_FRAMES = ('v1', 'v2_5', 'v3'), ('dh', 'sole')
 CHECKED = 50  # every so many poses one is computed anew
+_PERIOD = 0.001  # s from message to message
+_FROM_FAULT_TO_FAULT = 2.0  # s
 _CATCH_UP = 0.01  # s; what is later than that is not made up for
 _STAMP = struct.Struct('<iI')
 _STAMP_AT = 4
@@ -37,23 +39,42 @@ _POSE = struct.Struct('<7d')
 _BOTH, _LEFT, _RIGHT, _NONE = (True, True), (True, False), (False, True), (False, False)
 
 
+class Promise(NamedTuple):
+    """A pose that the rules of the input promise.
+
+    Attributes:
+        stamp: its stamp [ns].
+        certain: False while it is open whether the message has reached the node at all.
+        sent: when its message was sent [ns].
+        sample: which sample of the gait it shows.
+        fault: what was being done to the node then.
+    """
+
+    stamp: int
+    certain: bool
+    sent: int
+    sample: int
+    fault: str
+
+
 class SoakRobot:
     """Sends joint states, knows what poses they promise, and takes in what comes.
 
     Args:
         namespace: namespace of the node under test.
-        rate: messages per second [Hz].
 
     Attributes:
-        ledgers: by foot.
         latencies: of every tenth pose since they were last taken [us].
         sent: messages sent.
+        kept: poses that arrived as promised.
+        lost: promised poses that were passed over.
+        unexpected: poses that nothing had promised.
         twists: twists received.
         faults: how often each fault was done.
-        complaints: what else was not as it has to be.
+        complaints: what was not as it has to be, in words.
     """
 
-    def __init__(self, namespace: str, rate: float) -> None:
+    def __init__(self, namespace: str) -> None:
         rclpy.init(signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
         self._node = Node('robot', namespace=namespace)
         self._executor = EventsExecutor()
@@ -63,21 +84,21 @@ class SoakRobot:
         self._client = AsyncParameterClient(self._node, 'foot_pose_publisher')
         self._bystander: Any = None
         self._messages = _messages(random.Random(1))
-        self._period = 1.0 / rate
         self._stamp = 1_700_000_000 * SECOND
         self._certain = False
         self._answered_from = 0
-        self._doing = 'start'
+        self._fault = 'start'
         self._turn = self._ordinary()
         catalog = Catalog.load()
         self._chains = {foot: [catalog.chain(chain, version, frame) for version in VERSIONS
                                for frame in FOOT_FRAMES] for foot, chain in FEET.items()}
-        self.ledgers = {foot: Ledger(foot) for foot in FEET}
+        self._promised: dict[str, deque[Promise]] = {foot: deque() for foot in FEET}
+        self._kept = dict.fromkeys(FEET, 0)
         self.latencies: list[float] = []
-        self.sent = self.twists = 0
+        self.sent = self.lost = self.unexpected = self.twists = 0
         self._coming = itertools.cycle(self._all_faults())
         self._next_fault = 0.0
-        self.faults: dict[str, int] = {}
+        self.faults: Counter[str] = Counter()
         self.complaints: list[str] = []
         for foot in FEET:
             self._node.create_subscription(
@@ -87,28 +108,35 @@ class SoakRobot:
                 TwistStamped, f'foot_pose_publisher/{foot}/twist', self._receive_twist, 10,
                 raw=True)
 
-    def run(self, seconds: float, every: float) -> None:
-        """Send for some time, with another fault every few seconds [s]."""
+    @property
+    def kept(self) -> int:
+        """Poses that arrived as promised."""
+        return sum(self._kept.values())
+
+    def run(self, seconds: float) -> None:
+        """Send for some time [s]."""
         due = time.monotonic()
         end = due + seconds
         while (now := time.monotonic()) < end:
             if now >= self._next_fault:
-                self._next_fault = now + every
-                name, fault = next(self._coming)
-                self.faults[name] = self.faults.get(name, 0) + 1
-                self._doing, self._turn = name, fault()
+                self._next_fault = now + _FROM_FAULT_TO_FAULT
+                self._fault, fault = next(self._coming)
+                self.faults[self._fault] += 1
+                self._turn = fault()
             if now >= due:
-                due = max(due + self._period, now - _CATCH_UP)
+                due = max(due + _PERIOD, now - _CATCH_UP)
                 self._send(*next(self._turn))
             self._executor.spin_once(timeout_sec=max(0.0, due - time.monotonic()))
 
-    def settle(self, seconds: float = 5.0) -> None:
+    def finish(self, seconds: float = 5.0) -> None:
         """Wait until every promise is kept, and count those that are not."""
         end = time.monotonic() + seconds
-        while any(ledger.waits() for ledger in self.ledgers.values()) and time.monotonic() < end:
+        while time.monotonic() < end and any(
+                promise.certain for open_ones in self._promised.values() for promise in open_ones):
             self._executor.spin_once(timeout_sec=0.05)
-        for ledger in self.ledgers.values():
-            ledger.close()
+        for foot, open_ones in self._promised.items():
+            while open_ones:
+                self._miss(foot, open_ones.popleft())
 
     def connect(self, seconds: float = 30.0) -> bool:
         """Send until both feet answer; return whether they do."""
@@ -125,29 +153,37 @@ class SoakRobot:
         data = self._messages[kind][sample]
         _STAMP.pack_into(data, _STAMP_AT, *divmod(self._stamp, SECOND))
         sent = time.monotonic_ns()
-        for ledger, is_promised in zip(self.ledgers.values(), promised, strict=True):
+        for open_ones, is_promised in zip(self._promised.values(), promised, strict=True):
             if is_promised:
-                ledger.promise(Promise(self._stamp, self._certain, sent, sample, self._doing))
+                open_ones.append(Promise(self._stamp, self._certain, sent, sample, self._fault))
         self._publisher.publish(bytes(data[:16] if kind == 'malformed' else data))
         self.sent += 1
 
     def _receiver(self, foot: str) -> Callable[[bytes], None]:
-        ledger = self.ledgers[foot]
+        open_ones = self._promised[foot]
 
         def receive(data: bytes) -> None:
             now = time.monotonic_ns()
             sec, nanosec = _STAMP.unpack_from(data, _STAMP_AT)
-            promise = ledger.arrived(sec * SECOND + nanosec)
-            if promise is None:
+            stamp = sec * SECOND + nanosec
+            if all(promise.stamp != stamp for promise in open_ones):
+                self.unexpected += 1
+                self.complaints.append(f'{foot}: unexpected pose at {stamp}')
                 return
-            if ledger.kept % 10 == 0:
+            while (promise := open_ones.popleft()).stamp != stamp:
+                self._miss(foot, promise)
+            self._kept[foot] += 1
+            if self._kept[foot] % 10 == 0:
                 self.latencies.append((now - promise.sent) / 1000)
-            if ledger.kept % CHECKED == 0:
+            if self._kept[foot] % CHECKED == 0:
                 self._check(foot, promise, data)
-            if not self._certain and all(ledger.kept > self._answered_from
-                                         for ledger in self.ledgers.values()):
-                self._certain = True
+            self._certain = self._certain or min(self._kept.values()) > self._answered_from
         return receive
+
+    def _miss(self, foot: str, promise: Promise) -> None:
+        if promise.certain:
+            self.lost += 1
+            self.complaints.append(f'{foot}: lost pose at {promise.stamp} during {promise.fault}')
 
     def _receive_twist(self, data: bytes) -> None:
         self.twists += 1
@@ -157,7 +193,7 @@ class SoakRobot:
         q = joint_positions(12, 2 * math.pi * promise.sample / SAMPLES)[:6]
         pose = _POSE.unpack(data[-_POSE.size:])
         if not any(pose == chain.pose(q) for chain in self._chains[foot]):
-            self.complaints.append(f'{foot}: pose of no configuration during {promise.doing}')
+            self.complaints.append(f'{foot}: pose of no configuration during {promise.fault}')
 
     # What follows are endless sequences of (kind of message, feet promised[, step of time]).
 
@@ -205,9 +241,9 @@ class SoakRobot:
         """Leave, and come back as another publisher; nothing is certain until it is answered."""
         self._publisher.wait_for_all_acked(Duration(seconds=5))
         self._node.destroy_publisher(self._publisher)
-        self.settle()
+        self.finish()
         self._certain = False
-        self._answered_from = max(ledger.kept for ledger in self.ledgers.values())
+        self._answered_from = max(self._kept.values())
         self._publisher = self._node.create_publisher(JointState, 'joint_states', self._qos)
         return self._ordinary()
 
