@@ -4,7 +4,6 @@ import os
 from pathlib import Path
 import pickle
 import re
-import shutil
 
 from bag_files import (
     ENDINGS,
@@ -17,7 +16,6 @@ from bag_files import (
     POSE,
     poses_of,
     read_bag,
-    recorded_walk,
     RIGHT_POSE,
     SECOND,
     START,
@@ -148,14 +146,6 @@ def test_split_bags_become_one(tmp_path, storage, compression):
     (split / 'metadata.yaml').write_text(yaml.safe_dump(metadata))
     bag(split, tmp_path / 'out')
     assert_copied_with_poses(split, tmp_path / 'out', joints)
-
-
-def test_the_walk_of_a_real_robot_is_copied_with_poses(tmp_path):
-    joints = recorded_walk()
-    write_bag(tmp_path / 'in', joints=joints)
-    out = bag(tmp_path / 'in', tmp_path / 'out')
-    assert_copied_with_poses(tmp_path / 'in', tmp_path / 'out', joints)
-    assert f'{len(joints)}  added on {LEFT_POSE}' in out
 
 
 def test_chains_versions_frames_and_prefix_are_those_asked_for(tmp_path):
@@ -301,17 +291,6 @@ def test_what_gives_no_pose_is_counted_by_reason(tmp_path):
     assert f'3  added on {LEFT_POSE}' in out
 
 
-def test_joint_timeout_is_the_nodes(tmp_path):
-    joints = [(START, joint_state(START)),
-              (START + SECOND, joint_state(START + SECOND, LEGS[:3]))]
-    write_bag(tmp_path / 'in', joints=joints, others=False)
-    out = bag(tmp_path / 'in', tmp_path / 'out')
-    assert f'1  added on {LEFT_POSE}' in out
-    assert 'stale_joint (l_knee 1.000 s old' in out
-    out = bag(tmp_path / 'in', tmp_path / 'patient', '--joint-timeout', '0')
-    assert f'2  added on {LEFT_POSE}' in out
-
-
 def test_metadata_is_that_of_the_new_bag(tmp_path):
     joints = walk(31)
     write_bag(tmp_path / 'in', joints=joints)
@@ -364,18 +343,6 @@ def test_transforms_that_are_on_tf_already_are_refused_or_replaced(tmp_path):
         '/tf with l_foot_dh_frame, r_foot_dh_frame already; --replace-poses leaves')
     bag(tmp_path / 'once', tmp_path / 'twice', '--tf', '--replace-poses')
     assert read_bag(tmp_path / 'twice')[1] == read_bag(tmp_path / 'once')[1]
-
-
-def test_a_users_own_kinematics_file(tmp_path):
-    write_bag(tmp_path / 'in', joints=walk(5))
-    (tmp_path / 'broken.yaml').write_text('chains: 3\n')
-    assert_one_line_complaint(
-        leg_fk('bag', tmp_path / 'in', tmp_path / 'out', '-k', tmp_path / 'broken.yaml'),
-        'broken.yaml:1')
-    from icub_leg_fk.kinematics.catalog import config_file
-    shutil.copy(config_file('icub_kinematics.yaml'), tmp_path / 'own.yaml')
-    bag(tmp_path / 'in', tmp_path / 'out', '-k', tmp_path / 'own.yaml')
-    assert len(poses_of(read_bag(tmp_path / 'out')[1], LEFT_POSE)) == 5
 
 
 LEG_CHAINS = [Catalog.load().chain(name, 'v2_5') for name in ('left_leg', 'right_leg')]
@@ -454,7 +421,7 @@ def test_damage_and_missing_parts_end_in_one_line_with_what_mends_them(tmp_path)
         file.unlink()
         refused(tmp_path, source, 'missing')
     (tmp_path / 'empty').mkdir()
-    refused(tmp_path, tmp_path / 'empty', 'it is no rosbag2 recording')
+    refused(tmp_path, tmp_path / 'empty', 'it is not a rosbag2 recording')
     refused(tmp_path, tmp_path / 'nothing', 'there is no such file or directory')
 
 

@@ -12,7 +12,6 @@ from bag_files import (
     RIGHT_POSE,
     START,
     TYPES,
-    typesys,
     walk,
     write_bag,
 )
@@ -61,22 +60,6 @@ def test_the_mcap_library_finds_every_message_with_its_index(bag):
     assert poses == [data for topic, _, data in messages if topic == LEFT_POSE]
 
 
-def test_the_mcap_library_reads_the_file_as_a_stream_too(bag):
-    """From its first byte to its last, every record, without the summary's help."""
-    stream_reader = pytest.importorskip('mcap.stream_reader')
-    records = pytest.importorskip('mcap.records')
-    _, target = bag
-    with (target / 'out.mcap').open('rb') as file:
-        found = list(stream_reader.StreamReader(file, validate_crcs=True).records)
-    kinds = Counter(type(record).__name__ for record in found)
-    assert kinds['Footer'] == kinds['DataEnd'] == kinds['Statistics'] == 1
-    messages = [record for record in found if isinstance(record, records.Message)]
-    assert [message.data for message in messages] == [data for _, _, data in read_bag(target)[1]]
-    metadata, = (record for record in found if isinstance(record, records.Metadata))
-    assert metadata.name == 'rosbag2'
-    assert 'version: 9' in metadata.metadata['serialized_metadata']
-
-
 def test_channels_and_schemas_are_as_rosbag2_writes_them(bag):
     reader_module = pytest.importorskip('mcap.reader')
     source, target = bag
@@ -95,19 +78,6 @@ def test_channels_and_schemas_are_as_rosbag2_writes_them(bag):
     for topic, message_type in ADDED.items():
         schema = new.schemas[by_topic[topic].schema_id]
         assert (schema.name, schema.encoding) == (message_type, 'ros2msg')
-
-
-def test_definitions_of_what_is_added_are_those_of_ros(bag):
-    """Parsed by rosbags, they have the hash that ROS gives the type."""
-    reader_module = pytest.importorskip('mcap.reader')
-    _, target = bag
-    with (target / 'out.mcap').open('rb') as file:
-        schemas = reader_module.SeekingReader(file).get_summary().schemas.values()
-    for schema in schemas:
-        if schema.name in ADDED.values():
-            types = typesys.get_typestore(typesys.Stores.EMPTY)
-            types.register(typesys.get_types_from_msg(schema.data.decode(), schema.name))
-            assert types.hash_rihs01(schema.name) == TYPES.hash_rihs01(schema.name)
 
 
 @pytest.mark.parametrize('compression', ['zstd', 'lz4'])
@@ -141,42 +111,6 @@ def test_bags_of_the_mcap_library_are_read(tmp_path, compression):
     assert [row for row in found if 'foot_pose' not in row[1]] == sorted(
         expected, key=lambda row: row[0])
     assert sum(row[1] == LEFT_POSE for row in found) == 200
-
-
-def test_the_sqlite_file_has_rosbag2s_tables(tmp_path):
-    """Statements as in rosbag2_storage_sqlite3 (sqlite_storage.cpp, schema version 4)."""
-    write_bag(tmp_path / 'in', 'sqlite3', joints=walk(100))
-    done = leg_fk('bag', tmp_path / 'in', tmp_path / 'out', '--twist', '--tf')
-    assert done.returncode == 0, done
-    old = sqlite3.connect(tmp_path / 'in' / 'in.db3')
-    new = sqlite3.connect(tmp_path / 'out' / 'out.db3')
-
-    def columns(database):
-        return {table: database.execute(f'PRAGMA table_info({table})').fetchall() for table in (
-            'schema', 'metadata', 'topics', 'message_definitions', 'messages')}
-    assert columns(new) == columns(old)
-    assert new.execute("SELECT sql FROM sqlite_master WHERE type = 'index'").fetchall() == [
-        ('CREATE INDEX timestamp_idx ON messages (timestamp ASC)',)]
-    assert new.execute('PRAGMA integrity_check').fetchone() == ('ok',)
-    assert new.execute('SELECT * FROM schema').fetchall() == [(4, 'rosbags')]
-    (version, text), = new.execute('SELECT metadata_version, metadata FROM metadata').fetchall()
-    assert version == 9 and 'version: 9' in text.splitlines()
-    topics = {row[1]: row[2:] for row in new.execute('SELECT * FROM topics')}
-    for row in old.execute('SELECT * FROM topics'):
-        assert topics[row[1]] == row[2:]
-    definitions = {row[0]: row[1:] for row in new.execute(
-        'SELECT topic_type, encoding, encoded_message_definition, type_description_hash '
-        'FROM message_definitions')}
-    for row in old.execute('SELECT topic_type, encoding, encoded_message_definition, '
-                           'type_description_hash FROM message_definitions'):
-        assert definitions[row[0]] == row[1:]
-    for topic, message_type in ADDED.items():
-        assert topics[topic][0] == message_type
-        assert definitions[message_type][2] == TYPES.hash_rihs01(message_type)
-    replayed = new.execute(  # the query of rosbag2's player
-        'SELECT topics.name, timestamp, data FROM messages JOIN topics '
-        'ON messages.topic_id = topics.id ORDER BY messages.timestamp, messages.id').fetchall()
-    assert replayed == read_bag(tmp_path / 'out')[1]
 
 
 def test_qos_in_the_numbers_of_older_recorders_becomes_names(tmp_path):

@@ -19,10 +19,12 @@ from bag_files import (
     write_bag,
 )
 from geometry_msgs.msg import PoseStamped
+from icub_leg_fk.tools.bag import add_foot_poses
 from leg_fk_process import leg_fk
 from node_harness import FEET, LOSSLESS, NodeProcess, Robot
 import numpy as np
 import pytest
+from recorded_walk import DATA
 
 BURST = 50
 
@@ -181,6 +183,19 @@ def test_a_recorded_walk_gives_the_same_poses_in_the_node_and_in_the_tool(tmp_pa
     by_tool, _ = poses_by_tool(tmp_path, sent)
     assert_same(by_tool, by_node)
     assert len(by_node['right_foot']) >= len(messages)
+
+
+@pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
+def test_the_projects_bags_give_the_same_poses_in_the_node_and_in_the_tool(tmp_path, storage):
+    source = DATA / f'walk_{storage}'
+    sent, by_node = exchange([data for topic, _, data in read_bag(source)[1]
+                              if topic == '/joint_states'], {})
+    summary = add_foot_poses(source, tmp_path / 'direct')
+    direct = [data for topic, _, data in read_bag(tmp_path / 'direct')[1]
+              if topic == '/foot_pose_publisher/left_foot/pose']
+    assert summary.added == {f'/foot_pose_publisher/{tip}/pose': 25 for tip in FEET}
+    assert_same(poses_by_tool(tmp_path, sent)[0], by_node)
+    assert set(direct) <= set(by_node['left_foot'])
 
 
 def test_a_zero_stamp_differs_only_in_the_time_that_is_now(tmp_path):

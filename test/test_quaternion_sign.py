@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from icub_leg_fk.kinematics import Catalog, Chain
 import numpy as np
 import pytest
-from recorded_walk import needs_recorded_walk, read_recorded_walk
+from recorded_walk import needs_recorded_walk, read_recorded_walk, read_synthetic_walk
 
 CATALOG = Catalog.load()
 CHAINS = [CATALOG.chain(name, version, frame) for name, entry in CATALOG.chains.items()
@@ -21,14 +21,23 @@ def flips(chain: Chain, Q: np.ndarray) -> int:
     return int((np.sum(together[1:] * together[:-1], axis=1) < 0).sum())
 
 
-@needs_recorded_walk
-@pytest.mark.parametrize('frame', ['dh', 'sole'])
-def test_no_flip_on_the_recorded_walk(frame: str) -> None:
-    names, _, positions, _ = read_recorded_walk()
+def check_walk(names: list[str], positions: np.ndarray, frame: str) -> None:
     for leg in ('left_leg', 'right_leg'):
         chain = CATALOG.chain(leg, 'v2_5', frame)
         columns = [names.index(name) for name in chain.joint_names]
         assert flips(chain, positions[:, columns]) == 0
+
+
+@needs_recorded_walk
+@pytest.mark.parametrize('frame', ['dh', 'sole'])
+def test_no_flip_on_the_recorded_walk(frame: str) -> None:
+    names, _, positions, _ = read_recorded_walk()
+    check_walk(names, positions, frame)
+
+
+@pytest.mark.parametrize('frame', ['dh', 'sole'])
+def test_no_flip_on_the_synthetic_walk(frame: str) -> None:
+    check_walk(*read_synthetic_walk(), frame)
 
 
 @every_chain

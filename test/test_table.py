@@ -214,7 +214,7 @@ REFUSED = {
               'a', 'b', 'is a xacro file'),
     'entities': ('<!DOCTYPE r [' + ''.join(f'<!ENTITY e{i} "x">' for i in range(3000))
                  + ']><robot/>', 'a', 'b', 'declares a document type or entities'),
-    'sdf': ('<sdf/>', 'a', 'b', 'is no URDF: its root is <sdf>'),
+    'sdf': ('<sdf/>', 'a', 'b', 'is not a URDF: its root is <sdf>'),
     'no xml': ('left_leg', 'a', 'b', 'is not XML'),
     'nothing': ('', 'a', 'b', 'is not XML'),
 }

@@ -83,7 +83,7 @@ class Urdf:
         """Read a URDF.
 
         Raises:
-            InputFileError: it cannot be read or is no URDF; says why.
+            InputFileError: it cannot be read or is not a URDF; says why.
         """
         return _read(path)
 
@@ -156,7 +156,7 @@ def chain_from_urdf(urdf: Urdf | str | Path, root: str, tip: str, *, name: str =
         tolerance: angle between axes up to which they are taken as parallel [rad].
 
     Raises:
-        InputFileError: the file is no URDF, or these links are no chain.
+        InputFileError: the file is not a URDF, or these links are not a chain.
     """
     if convention not in CONVENTIONS:
         raise InputFileError(f'convention is {convention!r}; allowed: {", ".join(CONVENTIONS)}')
@@ -384,7 +384,7 @@ def _read(path: str | Path) -> Urdf:
         fail('is a xacro file; this makes a URDF of it: xacro '
              f'{Path(file).name} > robot.urdf')
     if root.tag != 'robot':
-        fail(f'is no URDF: its root is <{root.tag[:60]}>; allowed: <robot>')
+        fail(f'is not a URDF: its root is <{root.tag[:60]}>; allowed: <robot>')
     links = tuple(dict.fromkeys(link.get('name', '') for link in root.findall('link')))
     joints: dict[str, UrdfJoint] = {}
     for element in root.findall('joint'):

@@ -102,7 +102,7 @@ def joint_connections(reader: Any, path: str | Path, topic: str | None) -> list[
              if (connection.topic, connection.msgtype) == (name, JOINT_STATE)]
     if not found:
         there = (f'--joint-topic can be {", ".join(known)}' if known
-                 else f'no topic there is a {JOINT_STATE}')
+                 else f'it has no topic of type {JOINT_STATE}')
         raise InputFileError(f'{path}: no joint states on {name}; {there}')
     return found
 
@@ -114,7 +114,7 @@ def unreadable(path: str | Path, error: Exception) -> InputFileError:
     if path.is_dir():
         endings = {suffix for entry in path.iterdir() for suffix in entry.suffixes} & _MEND.keys()
         if not endings:
-            mend = 'it is no rosbag2 recording'
+            mend = 'it is not a rosbag2 recording'
         elif (path / METADATA).is_file():
             mend = _MEND[min(endings, key='.db3'.__eq__)]
         else:
