@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+import reprlib
 
 _LONG_NAME = 10  # characters; from here on a second slip is still a near miss
 
@@ -10,7 +11,8 @@ _LONG_NAME = 10  # characters; from here on a second slip is still a near miss
 def near(name: str, choices: Iterable[str]) -> str | None:
     """Return the choice that a name is a misspelling of; None if there is none.
 
-    Near is one slip (a character too many, too few or another), two from ten characters on.
+    Near is one slip (a character too many, too few or another, or two that have changed places),
+    two from ten characters on.
     """
     slips = 2 if len(name) >= _LONG_NAME else 1
     distances = {choice: _edit_distance(name, choice) for choice in choices if choice != name}
@@ -20,13 +22,16 @@ def near(name: str, choices: Iterable[str]) -> str | None:
 
 
 def _edit_distance(a: str, b: str) -> int:
-    """Return the Levenshtein distance."""
-    row = list(range(len(b) + 1))
+    """Return the distance of Damerau and Levenshtein, in its restricted form."""
+    rows = [list(range(len(b) + 1))]
     for i, x in enumerate(a, 1):
-        before, row[0] = row[0], i
+        rows.append([i])
         for j, y in enumerate(b, 1):
-            before, row[j] = row[j], min(row[j] + 1, row[j - 1] + 1, before + (x != y))
-    return row[-1]
+            least = min(rows[i - 1][j] + 1, rows[i][j - 1] + 1, rows[i - 1][j - 1] + (x != y))
+            if i > 1 and j > 1 and (x, a[i - 2]) == (b[j - 2], y):
+                least = min(least, rows[i - 2][j - 2] + 1)
+            rows[i].append(least)
+    return rows[-1][-1]
 
 
 class LegFKError(Exception):
@@ -47,9 +52,9 @@ class UnknownNameError(LegFKError):
         self.name = name
         self.choices = tuple(choices)
         known = ', '.join(self.choices) or 'none'
-        guess = near(name, self.choices)
+        guess = near(name, self.choices) if isinstance(name, str) else None
         hint = f'did you mean {guess!r}? ' if guess else ''
-        super().__init__(f'unknown {kind} {name!r}; {hint}known: {known}')
+        super().__init__(f'unknown {kind} {reprlib.repr(name)}; {hint}known: {known}')
 
 
 class JointVectorError(LegFKError):

@@ -101,8 +101,12 @@ def test_force_replaces_nothing_but_bags(tmp_path):
     linked = shutil.copytree(source, tmp_path / 'linked')
     (linked / 'in.mcap').rename(tmp_path / 'elsewhere.mcap')
     (linked / 'in.mcap').symlink_to(tmp_path / 'elsewhere.mcap')
+    (tmp_path / 'folder' / 'metadata.yaml').mkdir(parents=True)
+    (tmp_path / 'own').mkdir()
+    (tmp_path / 'own' / 'metadata.yaml').write_text('my: notes')
     before = sorted(tmp_path.rglob('*'))
-    for name in ('precious', 'notes.txt', 'empty', 'link', 'shelf', 'annotated', 'linked'):
+    for name in ('precious', 'notes.txt', 'empty', 'link', 'shelf', 'annotated', 'linked',
+                 'folder', 'own'):
         assert_one_line_complaint(leg_fk('bag', source, tmp_path / name, '--force'),
                                   'exists already and is something else')
     assert sorted(tmp_path.rglob('*')) == before

@@ -161,6 +161,12 @@ def test_an_iterator_is_refused_by_every_door(door: str) -> None:
         DOORS[door](iter([0.0] * 6))
 
 
+@pytest.mark.parametrize('door', [LEG.forward, LEG.pose, lambda q: LEG.poses(q[None])])
+def test_a_masked_array_is_refused_for_its_gaps(door: Any) -> None:
+    with pytest.raises(JointVectorError, match='MaskedArray'):
+        door(np.ma.array([0.0] * 6, mask=[True] + [False] * 5))
+
+
 @pytest.mark.parametrize('value', [float('nan'), float('inf'), float('-inf')])
 def test_a_bad_entry_is_named_by_its_place(value: float) -> None:
     with pytest.raises(JointVectorError, match=r'q\[2\] is (nan|-?inf); finite numbers are allow'):
@@ -219,8 +225,10 @@ def test_arrays_of_another_shape_are_refused(Q: object) -> None:
 
 
 def test_a_joint_vector_of_another_length_is_not_looked_up_in_the_ranges() -> None:
-    with pytest.raises(JointVectorError, match='has 5 values; 6 are allowed'):
+    with pytest.raises(JointVectorError, match='6 numbers are allowed'):
         LEG.out_of_range([0.0] * 5)
+    with pytest.raises(JointVectorError, match='6 numbers are allowed'):
+        LEG.out_of_range('abcdef')  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize('mistake', [

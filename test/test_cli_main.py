@@ -8,6 +8,7 @@ import subprocess
 import sys
 
 import icub_leg_fk
+from icub_leg_fk.kinematics.catalog import config_file
 from icub_leg_fk.tools.leg_fk import MODULES
 from leg_fk_process import assert_one_line_complaint, COMMAND, leg_fk
 import pytest
@@ -142,6 +143,11 @@ def test_alone_it_lists_its_commands():
     (['pose', 'left_leg', '--deg=0'], 'unknown option --deg; did you mean --degrees?'),
     (['plot', 'x.csv', '--ouput', 'y'], 'unknown option --ouput; did you mean --output?'),
     (['demo', '--colour'], 'unknown option --colour (see'),
+    (['pose', 'left_leg', '--frame', 'sole'], 'did you mean --foot-frame?'),
+    (['lsit'], "unknown command 'lsit'; did you mean 'list'?"),
+    (['pose', 'left_leg', '-k', '', '--degrees', '0'], 'a readable YAML file'),
+    (['pose', 'left_leg', '--version', '', '--degrees', '0'],
+     "unknown version of chain left_leg ''"),
     (['pos', 'left_leg'], "unknown command 'pos'; did you mean 'pose'? known: list, pose"),
     (['urdf', '--version', 'v9'], "unknown version 'v9'; did you mean 'v1'? known: v1, v2_5"),
 ])
@@ -152,7 +158,8 @@ def test_what_is_misspelt_is_named_with_what_is_near(words, complaint):
 @pytest.mark.parametrize(('line', 'offered'), [
     ('leg_fk po', {'pose'}), ('leg_fk pose --deg', {'--degrees'}),
     ('leg_fk pose left', {'left_leg'}),
-    ('leg_fk pose left_leg --version v2', {'v2', 'v2_5'})])
+    ('leg_fk pose left_leg --version v2', {'v2', 'v2_5'}),
+    (f'leg_fk pose -k {config_file("examples/ur5.yaml")} ur5 --version ', {'series_3'})])
 def test_the_shell_is_offered_commands_options_chains_and_versions(line, offered, tmp_path):
     pytest.importorskip('argcomplete')
     answer = tmp_path / 'answer'

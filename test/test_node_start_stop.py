@@ -42,6 +42,7 @@ BAD = {
     '-p kinematics_file:=true': ['kinematics_file', 'True'],
     '-p verson:=v1': ["unknown parameter 'verson'; did you mean 'version'?"],
     '-p left_leg.verson:=v1': ["did you mean 'left_leg.version'?"],
+    '-p versoin:=v1': ["did you mean 'version'?"],
     '-p publish_twsit:=true': ["did you mean 'publish_twist'?"],
     '-- version:=v1': ["'version:=v1'", 'did you mean --ros-args -p version:=v1?'],
     '-- _version:=v1': ["'_version:=v1'", 'did you mean --ros-args -p version:=v1?'],
@@ -117,6 +118,24 @@ def test_what_rcl_warns_of_is_shown():
 def test_bad_settings_of_the_log_do_not_keep_it_from_working(setting):
     with NodeProcess(environment={setting: 'true'}) as node, Robot(node) as robot:
         robot.connect()
+
+
+def test_domain_that_dds_does_not_have_is_refused_in_one_line():
+    node = subprocess.run([sys.executable, '-m', 'icub_leg_fk.ros.main'], check=False, text=True,
+                          env={**os.environ, 'ROS_DOMAIN_ID': '233'}, capture_output=True,
+                          timeout=DEADLINE)
+    assert (node.returncode, node.stdout) == (1, '')
+    assert node.stderr == (
+        'foot_pose_publisher: error: ROS_DOMAIN_ID: found 233, allowed: 0 to 232\n')
+
+
+def test_closed_stderr_does_not_keep_it_from_working():
+    with subprocess.Popen(['bash', '-c', f'exec {sys.executable} -m icub_leg_fk.ros.main 2>&-'],
+                          env={**os.environ, 'RCUTILS_LOGGING_USE_STDOUT': '1'},
+                          stdout=subprocess.PIPE, text=True) as node:
+        assert any('publishing' in line for line in node.stdout)
+        node.terminate()
+        assert node.wait(DEADLINE) == 0
 
 
 def test_loopback_that_is_down_is_told_with_what_mends_it():

@@ -12,6 +12,7 @@ from icub_leg_fk.tools.gait import walk
 from icub_leg_fk.tools.leg_fk import main
 from icub_leg_fk.tools.plot import default_instants
 from icub_leg_fk.tools.recording import ChainTrack
+from leg_fk_process import assert_one_line_complaint, leg_fk
 import numpy as np
 import pytest
 
@@ -267,7 +268,9 @@ def test_failed_picture_leaves_nothing_behind(walking_csv, monkeypatch):
     (['twice.csv'], ['twice.csv:1', 'column r_knee', 'twice']),
     (['text.csv'], ['text.csv:4', 'column r_hip_roll', "'soon'"]),
     (['nan.csv'], ['nan.csv:5', 'column time', "'nan'"]),
-    (['short.csv'], ['short.csv:6', 'column r_ankle_pitch', '12 values']),
+    (['short.csv'], ['short.csv:6', '12 values under 14 columns']),
+    (['long.csv'], ['long.csv:6', '15 values under 14 columns']),
+    (['huge.csv'], ['huge.csv:7', 'column r_hip_roll', "'1e300'", 'up to 1e+09']),
     (['unsorted.csv'], ['unsorted.csv:8', 'column time', '0.05 after 0.06']),
     (['binary.csv'], ['binary.csv', 'CSV']),
     (['broken.mcap'], ['broken.mcap', 'read']),
@@ -305,6 +308,8 @@ def spoil(good):
         'twice': [f'{line},{line.split(",")[at_r_knee]}' for line in lines],
         'text': edited(4, 'r_hip_roll', 'soon'), 'nan': edited(5, 'time', 'nan'),
         'short': [*lines[:5], ','.join(lines[5].split(',')[:12]), *lines[6:]],
+        'long': [*lines[:5], f'{lines[5]},1', *lines[6:]],
+        'huge': edited(7, 'r_hip_roll', '1e300'),
         'unsorted': [*lines[:6], lines[7], lines[6], *lines[8:]],
     }
     for name, content in files.items():
@@ -319,6 +324,21 @@ def test_bag_without_joint_states_lists_what_it_has(tmp_path, monkeypatch, gait,
     write_bag(tmp_path / 'bag', [(1.0, gait.joint_names, gait.positions[0])], topic='/legs')
     assert main(['plot', 'bag', '--joint-topic', '/joint_states']) == 2
     assert '/legs' in capsys.readouterr().err
+
+
+def test_matplotlibrc_that_is_no_text_is_one_line(walking_csv):
+    Path('matplotlibrc').write_bytes(b'# r\xe9glages')
+    assert_one_line_complaint(leg_fk('plot', walking_csv), 'is there a file matplotlibrc in this')
+
+
+def test_degrees_in_a_recording_are_warned_of(walking_csv, capsys, gait):
+    Path('degrees.csv').write_text('\n'.join([','.join(['time', *gait.joint_names]), *(
+        ','.join(map(str, [time, *np.degrees(angles)]))
+        for time, angles in zip(gait.times, gait.positions))]))
+    assert main(['plot', 'degrees.csv']) == 0
+    assert 'positions look like degrees, radians are expected: l_hip_p' in capsys.readouterr().err
+    assert main(['plot', 'walking.csv']) == 0
+    assert capsys.readouterr().err == ''
 
 
 def test_missing_matplotlib_is_one_line(walking_csv):

@@ -222,8 +222,8 @@ def test_a_slide_without_range_is_refused(tmp_path, capsys):
 
 
 def test_a_name_that_stands_twice_is_refused(tmp_path, capsys):
-    assert main(['urdf', *broken(tmp_path, 'frame: pad', 'frame: base')]) == 2
-    assert 'found link base twice' in capsys.readouterr().err
+    assert main(['urdf', *broken(tmp_path, 'frame: pad', 'frame: lift_link')]) == 2
+    assert 'found link lift_link twice' in capsys.readouterr().err
 
 
 def test_chains_of_different_roots_are_refused(tmp_path, capsys):

@@ -8,6 +8,7 @@ import math
 from pathlib import Path
 import sys
 import sysconfig
+from typing import TypeVar
 import warnings
 
 from icub_leg_fk.errors import CatalogError, UnknownNameError
@@ -20,6 +21,7 @@ import numpy as np
 
 PACKAGE = 'icub_leg_fk'
 
+_Thing = TypeVar('_Thing')
 _LENGTHS = ('mm', 'm')
 _ANGLES = ('deg', 'rad')
 _LONGEST = 1e9  # m; what is larger leaves no room to compute with
@@ -100,7 +102,7 @@ class Catalog(Frozen):
             CatalogError: the file cannot be read or has a mistake; it names file, line, chain,
                 version, row and field, what was found and what is allowed.
         """
-        file = Path(path) if path else config_file('icub_kinematics.yaml')
+        file = config_file('icub_kinematics.yaml') if path is None else Path(path)
         return _Reader().catalog(file)
 
     def entry(self, chain: str) -> ChainEntry:
@@ -109,9 +111,7 @@ class Catalog(Frozen):
         Raises:
             UnknownNameError: no such chain; lists the known ones.
         """
-        if chain not in self.chains:
-            raise UnknownNameError('chain', chain, self.chains)
-        return self.chains[chain]
+        return _named('chain', chain, self.chains)
 
     def chain(self, name: str, version: str, frame: str | None = None) -> Chain:
         """Return one version of one chain, ready to compute with.
@@ -125,13 +125,9 @@ class Catalog(Frozen):
             UnknownNameError: no such chain, version or tip frame; lists the known ones.
         """
         entry = self.entry(name)
-        if version not in entry.versions:
-            raise UnknownNameError(f'version of chain {name}', version, entry.versions)
-        table = entry.versions[version]
-        frame = next(iter(table.tip_frames)) if frame is None else frame
-        if frame not in table.tip_frames:
-            raise UnknownNameError(f'tip frame of chain {name}', frame, table.tip_frames)
-        tip = table.tip_frames[frame]
+        table = _named(f'version of chain {name}', version, entry.versions)
+        tip = _named(f'tip frame of chain {name}',
+                     next(iter(table.tip_frames)) if frame is None else frame, table.tip_frames)
         return Chain(
             name=name, version=version, root_frame=table.root_frame, tip=entry.tip,
             tip_frame=tip.frame, joint_names=table.joint_names, links=table.links,
@@ -177,6 +173,12 @@ def config_file(name: str) -> Path:
             return place / name
     raise CatalogError(name, 0, 'shipped configuration', 'nothing',
                        'one of ' + ', '.join(map(str, places)))
+
+
+def _named(kind: str, name: str, things: Mapping[str, _Thing]) -> _Thing:
+    if not isinstance(name, str) or name not in things:
+        raise UnknownNameError(kind, name, things)
+    return things[name]
 
 
 class _Reader:
@@ -227,10 +229,11 @@ class _Reader:
         if moving != len(joint_names):
             own['links'].fail(f'{len(joint_names)}, one per joint',
                               f'{moving} row{"s" * (moving != 1)} with a joint')
+        root_frame = place['root_frame'].name('a frame id', FRAME)
         return ChainVersion(
-            root_frame=place['root_frame'].name('a frame id', FRAME),
+            root_frame=root_frame,
             joint_names=joint_names,
-            tip_frames=self._tip_frames(place['tip_frames']),
+            tip_frames=self._tip_frames(place['tip_frames'], root_frame),
             convention=convention,
             T_root_0=self._transform(own['T_Ro0']),
             links=standard_rows(rows) if convention == 'modified' else tuple(rows),
@@ -247,13 +250,16 @@ class _Reader:
             joints.append(joint)
         return tuple(joints)
 
-    def _tip_frames(self, at: Field) -> dict[str, TipFrame]:
+    def _tip_frames(self, at: Field, root_frame: str) -> dict[str, TipFrame]:
         frames = {}
         for name, value in at.mapping('tip frames by name',
                                       lambda name: f'{at.where}, {name}', WORD).items():
             fields = value.record(('frame',), ('transform',))
             T = self._transform(fields['transform']) if 'transform' in fields else np.eye(4)
-            frames[name] = TipFrame(fields['frame'].name('a frame id', FRAME), T)
+            frame = fields['frame'].name('a frame id', FRAME)
+            if frame == root_frame:
+                fields['frame'].fail('another frame id than the root frame')
+            frames[name] = TipFrame(frame, T)
         if not frames:
             at.fail('at least one tip frame', 'none')
         return frames

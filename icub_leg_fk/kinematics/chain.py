@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 import math
+import reprlib
 
 from icub_leg_fk.errors import JointVectorError, LegFKError
 from icub_leg_fk.kinematics.frozen import Frozen
@@ -218,13 +219,15 @@ class Chain(Frozen):
             q: (n,) joint positions [rad or m].
 
         Raises:
-            JointVectorError: q has not n entries.
+            JointVectorError: q is not n numbers.
         """
-        if len(q) != self.n:
-            raise JointVectorError(f'joint vector has {len(q)} values; {self.n} are allowed, one '
-                                   'per joint')
-        return tuple([name for name, (lower, upper), position in zip(
-            self.joint_names, self._limits, q) if not lower <= position <= upper])
+        try:
+            return tuple([name for name, (lower, upper), position in zip(
+                self.joint_names, self._limits, q, strict=True)
+                if not lower <= position <= upper])
+        except (TypeError, ValueError) as error:
+            raise JointVectorError(f'joint vector is {reprlib.repr(q)}; {self.n} numbers are '
+                                   'allowed, one per joint') from error
 
     @cached_property
     def _limits(self) -> list[tuple[float, float]]:
@@ -244,9 +247,10 @@ class Chain(Frozen):
         except (OverflowError, TypeError, ValueError) as error:
             raise JointVectorError(f'{what} is not an array of numbers ({error}); {shape} finite '
                                    'numbers are allowed') from error
-        if values.dtype.kind not in 'biuf' and values.size:
-            raise JointVectorError(f'{what} is a {type(q).__name__} of {values.dtype.name}; '
-                                   f'{shape} finite real numbers are allowed')
+        if isinstance(q, (str, bytes, np.ma.MaskedArray)) or (
+                values.dtype.kind not in 'biuf' and values.size):
+            found = type(q).__name__ + (f' of {values.dtype.name}' if values.ndim else '')
+            raise JointVectorError(f'{what} is a {found}; {shape} finite real numbers are allowed')
         if (values.ndim != ndim if ndim else values.ndim < 1) or values.shape[-1] != self.n:
             raise JointVectorError(f'{what} has the shape {values.shape}; {shape} is allowed')
         values = values.astype(float, copy=False)

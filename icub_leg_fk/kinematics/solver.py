@@ -307,7 +307,8 @@ class Solver:
         fault = _fault_of(q, self._n, 'joint vector', 'q')
         if not fault and qdot is not None:
             fault = _fault_of(qdot, self._n, 'joint velocities', 'qdot')
-        return JointVectorError(fault or f'joint vector: {_TOO_LARGE}')
+        what = 'joint vector' if qdot is None else 'joint positions and velocities'
+        return JointVectorError(fault or f'{what}: {_TOO_LARGE}')
 
 
 def _fault_of(values: Sequence[float], n: int, kind: str, symbol: str) -> str:

@@ -29,6 +29,7 @@ import numpy as np
 PARALLEL = 1e-4  # rad; below it axes are taken as parallel
 
 _LARGEST_FILE = 50_000_000  # bytes
+_LARGEST = 1e9  # m or rad; what is larger leaves no room to compute with
 _EXACT = 1e-11  # rad and m; below it a number is rounding
 _NEARLY = 0.2  # rad; between axes that are this near a common normal may be far away
 _FAR = 1.0  # m along an axis, beside five times the distance of the joints
@@ -419,6 +420,8 @@ def _joint(element: ET.Element, fail: Callable[[str], NoReturn]) -> UrdfJoint:
         if len(values) != count or not all(map(math.isfinite, values)):
             fail(f'joint {name!r}: {tag} {key} is {text[:60]!r}; allowed: {count} finite '
                  f'number{"s" * (count > 1)}')
+        if tag == 'origin' and max(map(abs, values)) > _LARGEST:
+            fail(f'joint {name!r}: {tag} {key} is {text[:60]!r}; allowed: up to {_LARGEST:g}')
         return values
 
     def link(tag: str) -> str:

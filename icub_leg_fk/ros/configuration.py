@@ -82,7 +82,7 @@ class Configuration:
                                  'cannot look up')
         if values['publish_tf'] and find_spec('tf2_msgs') is None:
             raise ParameterError('parameter publish_tf: found true without the Python module '
-                                 'tf2_msgs; allowed: false, or install tf2_msgs')
+                                 'tf2_msgs; allowed: false, or install tf2_msgs, which ROS 2 has')
         for name, entry in catalog.chains.items():
             if own := values.get(version_parameter(name)):
                 _check_choice(version_parameter(name), own, tuple(entry.versions))

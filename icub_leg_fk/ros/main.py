@@ -13,6 +13,7 @@ import tempfile
 from types import FrameType
 from typing import Any
 
+_HIGHEST_DOMAIN = 232  # whose ports still are ports
 _SPIN_PERIOD = 0.25  # s; how long a signal may wait
 LOOPBACK_IS_DOWN = (
     'the loopback interface is down, over which ROS nodes of one machine find each other; this '
@@ -28,7 +29,9 @@ examples:
   foot_pose_publisher --ros-args --params-file foot_pose_publisher.yaml
 
 parameters: chains, version, <chain>.version, kinematics_file, foot_frame, frame_prefix,
-joint_timeout, stamp_source, publish_tf, publish_twist, publish_markers; the README has the table.
+joint_timeout, stamp_source, publish_tf, publish_twist, publish_markers.
+The package's docs/node.md explains them, and of a running node:
+  ros2 param describe /foot_pose_publisher NAME
 """
 
 
@@ -83,16 +86,17 @@ def _run(stop: _StopSignals, argv: list[str]) -> int:
                        'icub_leg_fk[ros]')
     from icub_leg_fk.errors import LegFKError
     from icub_leg_fk.ros.foot_pose_publisher import FootPosePublisher, START_ERRORS
-    if assignment := _bare_assignment(argv[1:]):
-        return _refuse(assignment)
+    if fault := _bare_assignment(argv[1:]) or unusable_domain():
+        return _refuse(fault)
     try:
         with _stderr_unless_it_raises():
             rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
         if others := remove_ros_args(argv)[1:]:
             return _refuse(f'unknown argument {others[0]!r}; parameters go behind --ros-args')
     except RuntimeError as error:  # rclpy's errors for arguments it cannot parse
-        unknown = type(error).__name__ == 'UnknownROSArgsError'
-        return _refuse(f'unknown argument {error} behind --ros-args' if unknown else str(error))
+        if type(error).__name__ == 'UnknownROSArgsError':
+            return _refuse(f'unknown argument {str(error).strip("[]")} behind --ros-args')
+        return _refuse(str(error).removesuffix('. Error: error not set'))
     stop.started()
     try:
         executor = _executor()
@@ -129,6 +133,9 @@ def _bare_assignment(arguments: Sequence[str]) -> str | None:
 @contextmanager
 def _stderr_unless_it_raises() -> Iterator[None]:
     """Let what C writes to stderr pass, but for the report of an error that is raised as well."""
+    if sys.stderr is None:  # it was closed before the start
+        yield
+        return
     sys.stderr.flush()
     stderr = os.dup(2)
     with tempfile.TemporaryFile() as written:
@@ -156,6 +163,14 @@ def loopback_is_up() -> bool:
     """Return whether processes of this machine can reach each other."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         return probe.connect_ex(('127.0.0.1', 9)) == 0  # sends nothing
+
+
+def unusable_domain() -> str:
+    """Say what is wrong with ROS_DOMAIN_ID; for one too high Fast DDS ends the process."""
+    domain = os.environ.get('ROS_DOMAIN_ID', '')
+    if domain.isdecimal() and int(domain) > _HIGHEST_DOMAIN:
+        return f'ROS_DOMAIN_ID: found {domain}, allowed: 0 to {_HIGHEST_DOMAIN}'
+    return ''
 
 
 def _executor() -> Any:

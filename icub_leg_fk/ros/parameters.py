@@ -52,7 +52,8 @@ _PARAMETERS = (
                'path of a YAML file'),
     _Parameter('foot_frame', 'dh', "Axes of the tip: the table's last frame, or the sole.",
                'a tip frame of the kinematics file, such as dh or sole'),
-    _Parameter('frame_prefix', '', 'Put before every frame id.', 'printable, no space'),
+    _Parameter('frame_prefix', '', 'Put before every frame id.',
+               'printable, no space, no leading slash'),
     _Parameter('joint_timeout', DEFAULT_TIMEOUT, 'Age of a joint beside the newest of its chain '
                'above which the chain is held back [s]; 0 turns this off.', '', LONGEST_TIMEOUT),
     _Parameter('stamp_source', 'message', "Stamp of the poses: the message's, or the node's "
@@ -96,7 +97,7 @@ class NodeParameters:
         self._declaring = True
         for parameter in _PARAMETERS:
             self._declare(parameter)
-        self._catalog = Catalog.load(node.get_parameter('kinematics_file').value)
+        self._catalog = Catalog.load(node.get_parameter('kinematics_file').value or None)
         for parameter in self._version_parameters():
             self._declare(parameter)
         self._check_overrides()
@@ -191,7 +192,7 @@ class NodeParameters:
         try:
             catalog = self._catalog
             if 'kinematics_file' in ours:
-                catalog = Catalog.load(values['kinematics_file'])
+                catalog = Catalog.load(values['kinematics_file'] or None)
             self._candidate = catalog, Configuration.from_parameters(values, catalog)
         except LegFKError as error:
             return SetParametersResult(successful=False, reason=str(error))

@@ -106,8 +106,8 @@ class SignsOfLife:
     def _look_at(self, second: Second, chain: Chain, counts: ChainCounts) -> None:
         name = chain.name
         if counts.ready:
-            self._once(f'{name} first',
-                       f'first pose of {chain.tip}; {second.publishers()} on {self._topic}')
+            publishers = f'; {second.publishers()} on {self._topic}' if second.types else ''
+            self._once(f'{name} first', f'first pose of {chain.tip}{publishers}')
         if second.messages > second.rejected['malformed']:
             foreign = set(chain.joint_names).isdisjoint(second.names)
             self._warn(f'{name} foreign', foreign, lambda: (

@@ -89,7 +89,7 @@ class Summary:
 def add_foot_poses(
         source: str | Path, target: str | Path, *,
         chains: Sequence[str] = ('left_leg', 'right_leg'), version: str = DEFAULT_VERSION,
-        chain_versions: Mapping[str, str] | None = None, kinematics_file: str = '',
+        chain_versions: Mapping[str, str] | None = None, kinematics_file: str | None = None,
         foot_frame: str = 'dh', frame_prefix: str = '', joint_timeout: float = 0.5,
         joint_topic: str | None = None, twist: bool = False, tf: bool = False,
         only_poses: bool = False, replace_poses: bool = False, storage: str = '',
@@ -102,7 +102,7 @@ def add_foot_poses(
         chains: chains of the kinematics file.
         version: version of every chain that has none of its own.
         chain_versions: versions of single chains, by name.
-        kinematics_file: path of a kinematics file; the shipped one if empty.
+        kinematics_file: path of a kinematics file; the shipped one if None.
         foot_frame: a tip frame's name.
         frame_prefix: put before every frame id.
         joint_timeout: age of a joint beside the newest of its chain that holds the chain back [s].
@@ -375,9 +375,9 @@ class _ChainOutput:
         self.encode_twist = TwistStampedEncoder(self.frames[0]).encode
 
 
-def _configuration(*, chains: list[str], version: str, kinematics_file: str, foot_frame: str,
-                   frame_prefix: str, joint_timeout: float, chain_versions: Mapping[str, str],
-                   twist: bool, tf: bool) -> Configuration:
+def _configuration(*, chains: list[str], version: str, kinematics_file: str | None,
+                   foot_frame: str, frame_prefix: str, joint_timeout: float,
+                   chain_versions: Mapping[str, str], twist: bool, tf: bool) -> Configuration:
     """Return what the node's parameters of the same meaning would amount to."""
     from icub_leg_fk.kinematics import Catalog
     from icub_leg_fk.ros.configuration import Configuration, version_parameter
@@ -472,7 +472,7 @@ def run(args: argparse.Namespace) -> int:
     options = {
         'chains': args.chains, 'version': args.version,
         'chain_versions': own_versions(args, args.chains),
-        'kinematics_file': args.kinematics_file or '', 'foot_frame': args.foot_frame,
+        'kinematics_file': args.kinematics_file, 'foot_frame': args.foot_frame,
         'frame_prefix': args.frame_prefix, 'joint_timeout': args.joint_timeout,
         'joint_topic': args.joint_topic, 'twist': args.twist, 'tf': args.tf,
         'only_poses': args.only_poses, 'replace_poses': args.replace_poses,

@@ -114,7 +114,7 @@ def unreadable(path: str | Path, error: Exception) -> InputFileError:
     if path.is_dir():
         endings = {suffix for entry in path.iterdir() for suffix in entry.suffixes} & _MEND.keys()
         if not endings:
-            mend = 'it is not a rosbag2 recording'
+            reason, mend = f'it has no {METADATA}', 'it is not a rosbag2 recording'
         elif (path / METADATA).is_file():
             mend = _MEND[min(endings, key='.db3'.__eq__)]
         else:

@@ -45,17 +45,19 @@ def add_chain(parser: argparse.ArgumentParser) -> None:
     add_kinematics_file(parser)
 
 
-def _known_chains(**_: object) -> list[str]:
-    from icub_leg_fk.kinematics import Catalog
-
-    return [*Catalog.load().chains]
+def _known_chains(parsed_args: argparse.Namespace, **_: object) -> list[str]:
+    return [*_catalog_so_far(parsed_args).chains]
 
 
-def _known_versions(**_: object) -> list[str]:
-    from icub_leg_fk.kinematics import Catalog
-
-    return [*dict.fromkeys(version for entry in Catalog.load().chains.values()
+def _known_versions(parsed_args: argparse.Namespace, **_: object) -> list[str]:
+    return [*dict.fromkeys(version for entry in _catalog_so_far(parsed_args).chains.values()
                            for version in entry.versions)]
+
+
+def _catalog_so_far(parsed_args: argparse.Namespace) -> Catalog:
+    from icub_leg_fk.kinematics import Catalog
+
+    return Catalog.load(getattr(parsed_args, 'kinematics_file', None))
 
 
 def add_foot_frame(parser: argparse.ArgumentParser) -> None:
@@ -129,7 +131,7 @@ def chosen_version(catalog: Catalog, chain: str, version: str | None) -> str:
     if version is None and DEFAULT_VERSION not in versions:
         raise LegFKError(f'chain {chain} has no version {DEFAULT_VERSION}, the default: give '
                          f'--version; known: {", ".join(versions)}')
-    return version or DEFAULT_VERSION
+    return DEFAULT_VERSION if version is None else version
 
 
 def load_catalog(args: argparse.Namespace) -> Catalog:

@@ -210,7 +210,7 @@ def conclude(answers: Sequence[Answers], times: Sequence[float], whole: bool) ->
         *np.nanpercentile(latencies, (50, 99, 100)))
     duration = times[-1] - times[0] if sent else 0.0
     missing = (f'lost          {lost or "none"}' if whole
-               else f'interrupted   {lost} poses had not arrived; no picture, no bag')
+               else f'interrupted   {lost} of the poses had not arrived; no picture, no bag')
     print(f'\nmessages in   {sent}  in {duration:.2f} s\n'
           f'poses out     {arrived}  ({", ".join(f"{a.tip} {a.arrived}" for a in answers)})\n'
           f'{missing}\n'

@@ -14,6 +14,7 @@ from typing import Any
 
 from icub_leg_fk.errors import LegFKError, MissingDependencyError
 from icub_leg_fk.kinematics.rotation import Array
+from icub_leg_fk.ros.main import LOOPBACK_IS_DOWN, loopback_is_up, unusable_domain
 from icub_leg_fk.tools.recording import JointRecording
 from icub_leg_fk.tools.signals import held_signals
 import numpy as np
@@ -58,7 +59,12 @@ def stay_on_this_machine() -> str:
     """Set up the environment so that DDS reaches nobody else; return the ROS_DOMAIN_ID.
 
     A domain that the user has chosen stays.
+
+    Raises:
+        LegFKError: it is one that DDS does not have.
     """
+    if fault := unusable_domain():
+        raise LegFKError(fault)
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     os.environ.pop('ROS_STATIC_PEERS', None)
     return os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % _HIGHEST_DOMAIN))
@@ -183,8 +189,6 @@ class Replay:
         Raises:
             DemoError: they have not found each other in time.
         """
-        from icub_leg_fk.ros.main import LOOPBACK_IS_DOWN, loopback_is_up
-
         deadline, next_probe = time.monotonic() + _DISCOVERY_TIMEOUT, 0.0
         while len(self._answered_probe) < len(self.answers):
             check()

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
+import logging
 import math
 import os
 from pathlib import Path
@@ -56,12 +57,16 @@ def _plain_matplotlib() -> Iterator[None]:
     plain = {'MPLBACKEND': 'agg', 'MATPLOTLIBRC': os.devnull}
     before = {name: os.environ.get(name) for name in plain}
     os.environ.update(plain)
+    logging.getLogger('matplotlib').setLevel(logging.CRITICAL)  # what it says of a matplotlibrc
     try:
         from matplotlib import rc_context, rcdefaults, rcParams
     except ImportError as error:
         raise MissingDependencyError(
             'pictures need matplotlib: pip install matplotlib (rosdep key python3-matplotlib)'
         ) from error
+    except ValueError as error:  # a matplotlibrc in the working directory that is not text
+        raise LegFKError(f'matplotlib cannot be imported: {error}; is there a file matplotlibrc '
+                         'in this directory?') from error
     finally:
         for name, value in before.items():
             if value is None:
@@ -329,7 +334,8 @@ def _draw_curve(panel: Axes, track: ChainTrack, column: int) -> None:
     times, values, breaks = track.times, track.poses[:, column], _breaks(track.times)
     if len(times) <= _MOST_SAMPLES:
         panel.plot(np.insert(times, breaks, np.nan), np.insert(values, breaks, np.nan),
-                   color=color, label=label, linewidth=2, marker='o' if len(times) < 3 else '')
+                   color=color, label=label, linewidth=2,
+                   marker='o' if len(np.unique(times)) < 3 else '')
         return
     ends = [0, *breaks.tolist(), len(times)]
     edges = np.unique(np.concatenate([

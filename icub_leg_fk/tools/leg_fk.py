@@ -99,7 +99,8 @@ class CommandParser(Parser):
                     or (word[:2] in known and not word.startswith('--'))):
                 continue
             guess = near(option, known) or next(
-                (name for name in known if name.startswith('--') and name.startswith(option)), '')
+                (name for name in known if name.startswith('--') and len(option) > 3
+                 and option[2:] in name), '')
             hint = f'; did you mean {guess}?' if guess else ''
             self.error(f'unknown option {option}{hint}')
 

@@ -92,9 +92,12 @@ def is_bag(path: Path) -> bool:
     """Return whether a path is a bag and nothing more, so that replacing it loses only a bag."""
     if path.is_symlink():
         return False
-    if path.is_file():
-        return path.suffix in ('.mcap', '.db3')
+    if not path.is_dir():
+        return path.is_file() and path.suffix in ('.mcap', '.db3')
     entries = list(path.iterdir())
-    others = [entry.name for entry in entries if entry.is_symlink() or not entry.is_file()
-              or not re.search(r'\.(mcap|db3)(\.zstd)?(-wal|-shm)?$', entry.name)]
-    return others == ['metadata.yaml']
+    if any(entry.is_symlink() or not entry.is_file() for entry in entries):
+        return False
+    others = [entry for entry in entries
+              if not re.search(r'\.(mcap|db3)(\.zstd)?(-wal|-shm)?$', entry.name)]
+    return ([entry.name for entry in others] == ['metadata.yaml']
+            and b'rosbag2_bagfile_information' in others[0].read_bytes())

@@ -41,6 +41,8 @@ examples:
 
 DEFAULT_CHAINS = ('left_leg', 'right_leg')
 MAX_INSTANTS = 4
+_LONGEST_NAME = 50  # characters of a title
+_LIKE = 0.02  # so much of the whole movement lower, and an instant is as good as the extreme
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -89,12 +91,18 @@ def run(args: argparse.Namespace) -> int:
     tracks = _between(found.tracks, args.begin, args.end)
     instants = _checked(args.at, tracks) if args.at else default_instants(tracks)
     versions = dict.fromkeys(chain.version for chain in chains)
-    title = f'{args.input.resolve().name}   {", ".join(versions)}'
+    name = args.input.resolve().name
+    shown = name if len(name) <= _LONGEST_NAME else f'{name[:_LONGEST_NAME]}...'
+    title = f'{shown}   {", ".join(versions)}'
     soles = {chain.name: catalog.chain(chain.name, chain.version, SOLE) for chain in chains
              if SOLE in catalog.entry(chain.name).versions[chain.version].tip_frames}
     save_picture(lambda: feet_figure(tracks, instants, title, soles), output, force=args.force)
-    poses = ', '.join(f'{len(track.times)} poses of {track.chain.tip}' for track in tracks)
+    poses = ', '.join(f'{len(track.times)} pose{"s" * (len(track.times) != 1)} of '
+                      f'{track.chain.tip}' for track in tracks)
     print(f'{output}: {poses}')
+    if doubtful := [joint for track in tracks for joint in _like_degrees(track)]:
+        print(f'leg_fk: warning: positions look like degrees, radians are expected: '
+              f'{", ".join(doubtful)}', file=sys.stderr)
     for chain in found.poseless:
         print(f'leg_fk: note: not drawn: {chain}', file=sys.stderr)
     return 0
@@ -114,12 +122,27 @@ def default_instants(tracks: Sequence[ChainTrack]) -> list[float]:
         one, two = tracks
         apart = one.poses[:, :3] - np.stack(
             [np.interp(one.times, two.times, two.poses[:, i]) for i in range(3)], axis=1)
-        rows = {int(pick(apart[:, i])) for i in (2, 0) for pick in (np.argmax, np.argmin)}
-        instants = sorted(float(one.times[row]) for row in rows)
-        if len(instants) == MAX_INSTANTS:
-            return instants
+        instants = []
+        for i, (axis, sign) in enumerate(((2, 1), (0, 1), (2, -1), (0, -1))):
+            height = sign * apart[:, axis]
+            like = np.flatnonzero(height >= height.max() - _LIKE * np.ptp(height))
+            # Of a gait's many steps one of the i-th quarter, so that the picture is spread out.
+            quarter = start + (end - start) * (i + 0.5) / MAX_INSTANTS
+            instants.append(float(one.times[like[np.abs(one.times[like] - quarter).argmin()]]))
+        if len(set(instants)) == MAX_INSTANTS:
+            return sorted(instants)
     return [start + (end - start) * share for share in (0.0, 1 / 3, 2 / 3, 1.0)] \
         if end > start else [start]
+
+
+def _like_degrees(track: ChainTrack) -> list[str]:
+    """Return the joints that are whole turns beyond their ranges, by the node's rule."""
+    import numpy as np
+
+    chain, q = track.chain, track.positions
+    beyond = np.minimum(np.abs(q), np.maximum(chain.lower - q, q - chain.upper)).max(axis=0)
+    return [name for name, link, far in zip(chain.joint_names, chain.joints, beyond.tolist())
+            if far > 2 * math.pi and not link.is_prismatic]
 
 
 def _chosen_chains(catalog: Catalog, args: argparse.Namespace) -> list[Chain]:

@@ -14,6 +14,7 @@ from typing import Any
 from icub_leg_fk.errors import InputFileError
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
+from icub_leg_fk.tools.chain_arguments import LARGEST
 import numpy as np
 
 TIMES = ('time', 'Time', 'timestamp')
@@ -187,13 +188,15 @@ def _rows(file: str, reader: Any, joints: Sequence[str]) -> Iterator[list[float]
     for row in reader:
         if not row:  # an empty line
             continue
+        if len(row) != len(header):
+            raise InputFileError(f'{file}:{reader.line_num}: {len(row)} values under '
+                                 f'{len(header)} columns; allowed: one value per column')
         numbers = []
         for name, place in zip(columns, places, strict=True):
-            number = _number(row, place)
-            if number is None:
-                found = repr(row[place]) if place < len(row) else f'a row of {len(row)} values'
-                raise InputFileError(f'{file}:{reader.line_num}: column {name}: {found}; '
-                                     'allowed: a finite number')
+            number = _number(row[place])
+            if math.isnan(number) or (name != time and abs(number) > LARGEST):
+                raise InputFileError(f'{file}:{reader.line_num}: column {name}: {row[place]!r}; '
+                                     f'allowed: a finite number up to {LARGEST:g}')
             numbers.append(number)
         if numbers[0] < before:
             raise InputFileError(f'{file}:{reader.line_num}: column {time}: {numbers[0]} after '
@@ -204,10 +207,10 @@ def _rows(file: str, reader: Any, joints: Sequence[str]) -> Iterator[list[float]
         raise InputFileError(f'{file}: no rows; allowed: at least one after the header')
 
 
-def _number(row: list[str], place: int) -> float | None:
-    """Return the number at a place, or None if there is no finite one."""
+def _number(text: str) -> float:
+    """Return a finite number, or NaN if the text is none."""
     try:
-        number = float(row[place])
-    except (ValueError, IndexError):
-        return None
-    return number if math.isfinite(number) else None
+        number = float(text)
+    except ValueError:
+        return math.nan
+    return number if math.isfinite(number) else math.nan

@@ -21,8 +21,9 @@ if TYPE_CHECKING:
 
 HELP = 'write chains as a URDF, for RViz, Pinocchio and others'
 EXAMPLES = """\
-The URDF has the frames of the tables: both tip frames where a chain has two, joint names and
-printed ranges. Every chain hangs from the root frame, which the chains must share.
+The URDF has the frames of the tables, both tip frames where a chain has two, the joint names, and
+as limits the ranges: the robots' where they are known, else the printed ones. Every chain hangs
+from the root frame, which the chains must share.
 
 examples:
   leg_fk urdf -o legs.urdf
