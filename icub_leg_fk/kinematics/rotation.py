@@ -126,6 +126,21 @@ def quaternion_to_matrix(quaternion: ArrayLike) -> Array:
     return R
 
 
+def turns_about(axis: Array, angle: ArrayLike) -> Array:
+    """Return the (..., 3, 3) rotations by (...) angles [rad] about a unit vector (Rodrigues)."""
+    x, y, z = axis
+    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    angle = np.asarray(angle, dtype=float)[..., None, None]
+    return np.asarray(np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K))
+
+
+def angle_between(one: Array, two: Array) -> Array:
+    """Return the (...) angles [rad] between (..., 3, 3) rotations, exact also where small."""
+    # |R1 - R2| is 2 sqrt(2) sin(angle / 2).
+    chord = np.linalg.norm(one - two, axis=(-2, -1)) / math.sqrt(8)
+    return np.asarray(2 * np.arcsin(np.minimum(chord, 1.0)))
+
+
 def is_rigid_transform(T: Array, tolerance: float = 1e-6) -> bool:
     """Tell whether a (4, 4) matrix is a proper rotation and a translation, and nothing else.
 

@@ -23,7 +23,7 @@ from xml.etree import ElementTree as ET
 from icub_leg_fk.errors import InputFileError, near
 from icub_leg_fk.kinematics.chain import Chain, CONVENTIONS
 from icub_leg_fk.kinematics.link import DHLink
-from icub_leg_fk.kinematics.rotation import Array, cos_sin
+from icub_leg_fk.kinematics.rotation import Array, cos_sin, turns_about
 import numpy as np
 
 PARALLEL = 1e-4  # rad; below it axes are taken as parallel
@@ -350,14 +350,12 @@ def _frame(x: Array, z: Array, origin: Array) -> Array:
 
 
 def _motion(joint: UrdfJoint, q: Array) -> Array:
-    """Return the (N, 4, 4) motion of a joint: about its axis (Rodrigues) or along it."""
+    """Return the (N, 4, 4) motion of a joint: about its axis or along it."""
     T = np.tile(np.eye(4), (len(q), 1, 1))
     if joint.kind == 'prismatic':
         T[:, :3, 3] = q[:, None] * joint.axis
         return T
-    x, y, z = joint.axis
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    T[:, :3, :3] += np.sin(q)[:, None, None] * K + (1 - np.cos(q))[:, None, None] * (K @ K)
+    T[:, :3, :3] = turns_about(joint.axis, q)
     return T
 
 

@@ -85,15 +85,9 @@ def messages(reader: Any, path: str | Path, connections: Sequence[Any]
 
 
 def joint_connections(reader: Any, path: str | Path, topic: str | None) -> list[Any]:
-    """Return the connections that bring joint states.
+    """Return the connections of a topic of joint states.
 
-    Args:
-        reader: the reader.
-        path: the recording, for errors.
-        topic: topic wanted; None for `/joint_states`, or the only one there is.
-
-    Raises:
-        InputFileError: there is none; lists the topics of that type.
+    If None, the topic is `/joint_states`, or the only one there is.
     """
     known = sorted({connection.topic for connection in reader.connections
                     if connection.msgtype == JOINT_STATE})

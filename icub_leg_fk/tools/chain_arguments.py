@@ -75,15 +75,7 @@ def add_chain_version(parser: argparse.ArgumentParser) -> None:
 
 
 def own_versions(args: argparse.Namespace, chains: Sequence[str]) -> dict[str, str]:
-    """Return the versions given by `--chain-version`, by chain.
-
-    Args:
-        args: what has been parsed.
-        chains: the chains that may have one.
-
-    Raises:
-        LegFKError: another chain is named, or one twice.
-    """
+    """Return the versions given by `--chain-version`, for chains that may have one."""
     versions: dict[str, str] = {}
     for chain, version in args.chain_version:
         if chain not in chains or chain in versions:
@@ -121,12 +113,7 @@ def _finite_number(text: str) -> float:
 
 
 def chosen_version(catalog: Catalog, chain: str, version: str | None) -> str:
-    """Return the version asked for, or else the default one if the chain has that.
-
-    Raises:
-        UnknownNameError: no such chain; lists the known ones.
-        LegFKError: no version was given and the chain lacks the default one.
-    """
+    """Return the version asked for, or else the default one if the chain has that."""
     versions = catalog.entry(chain).versions
     if version is None and DEFAULT_VERSION not in versions:
         raise LegFKError(f'chain {chain} has no version {DEFAULT_VERSION}, the default: give '
@@ -135,11 +122,7 @@ def chosen_version(catalog: Catalog, chain: str, version: str | None) -> str:
 
 
 def load_catalog(args: argparse.Namespace) -> Catalog:
-    """Return the catalog that `-k` names; what it warns of is said on stderr.
-
-    Raises:
-        CatalogError: the file is bad.
-    """
+    """Return the catalog that `-k` names; what it warns of is said on stderr."""
     from icub_leg_fk.kinematics import Catalog
 
     catalog = Catalog.load(args.kinematics_file)
@@ -149,22 +132,14 @@ def load_catalog(args: argparse.Namespace) -> Catalog:
 
 
 def load_chain(args: argparse.Namespace) -> tuple[Catalog, Chain]:
-    """Return the catalog and the chain that the options of `add_chain` name.
-
-    Raises:
-        LegFKError: the file is bad, or a name is not in it.
-    """
+    """Return the catalog and the chain that the options of `add_chain` name."""
     catalog = load_catalog(args)
     version = chosen_version(catalog, args.chain, args.version)
     return catalog, catalog.chain(args.chain, version, args.foot_frame)
 
 
 def joint_positions(args: argparse.Namespace, chain: Chain) -> list[float] | None:
-    """Return the joint vector given by `--degrees` or `--radians` [rad or m]; None if none is.
-
-    Raises:
-        JointVectorError: not one value per joint.
-    """
+    """Return the joint vector given by `--degrees` or `--radians` [rad or m]; None if none is."""
     given: Sequence[float] | None = args.radians if args.degrees is None else args.degrees
     if given is None:
         return None

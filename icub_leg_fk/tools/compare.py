@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from itertools import permutations, product
 import math
 from typing import Any, NamedTuple, TYPE_CHECKING
 
@@ -35,20 +36,10 @@ _ARM = 0.3  # m; weighs angles against lengths in the fit
 
 
 class Difference(NamedTuple):
-    """How far a table is from a robot.
+    """How far a table is from a robot: largest and mean distance and angle.
 
-    Attributes:
-        chain: name of the chain.
-        version: name of the version.
-        root: frame id of the root.
-        frame: frame id that both have.
-        mm: largest and mean distance [mm].
-        deg: largest and mean angle [deg], after a pure turn of axes.
-        turn: such a turn of the tip's axes, in words; empty if there is none.
-        fitted_mm: largest and mean distance after the best constants [mm]; None if the joints
-            are too few to tell.
-        fitted_deg: likewise [deg].
-        nearest: whether no other version of the chain is nearer.
+    The angle is counted after a pure turn of the tip's axes, which `turn` has in words; what is
+    fitted is after the best constants, and None where the joints are too few to tell.
     """
 
     chain: str
@@ -139,39 +130,31 @@ def _nearest(rows: Sequence[Difference], chain: str) -> Difference:
 
 def _distance(one: Array, two: Array) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return largest and mean distance [mm] and angle [deg] between transforms."""
+    from icub_leg_fk.kinematics.rotation import angle_between
     import numpy as np
 
     off = 1000 * np.linalg.norm(one[:, :3, 3] - two[:, :3, 3], axis=1)
-    chord = np.linalg.norm(one[:, :3, :3] - two[:, :3, :3], axis=(1, 2)) / math.sqrt(8)
-    angle = np.degrees(2 * np.arcsin(np.minimum(chord, 1.0)))
+    angle = np.degrees(angle_between(one[:, :3, :3], two[:, :3, :3]))
     return ((float(off.max()), float(off.mean())), (float(angle.max()), float(angle.mean())))
 
 
 def _turn_of_axes(ours: Array, robot: Array) -> tuple[Array, str]:
     """Return the turn by right angles that brings the tip's axes nearest, and its words."""
+    from icub_leg_fk.kinematics.rotation import matrix_to_quaternion
     import numpy as np
 
-    T = np.eye(4)
     mean = (np.swapaxes(ours[:, :3, :3], 1, 2) @ robot[:, :3, :3]).mean(axis=0)
-    R = np.zeros((3, 3))
-    for _ in range(3):  # the nearest signed permutation, largest entry by largest entry
-        taken = np.add.outer(np.abs(R).sum(axis=1), np.abs(R).sum(axis=0)) > 0
-        masked = np.where(taken, 0.0, mean)
-        i, j = np.unravel_index(int(np.abs(masked).argmax()), (3, 3))
-        R[i, j] = math.copysign(1.0, mean[i, j])
-    if np.linalg.det(R) < 0 or np.trace(R) > 2.5:
+    signed = (np.eye(3)[list(order)] * signs for order in permutations(range(3))
+              for signs in product((1, -1), repeat=3))
+    T = np.eye(4)
+    T[:3, :3] = max((R for R in signed if np.linalg.det(R) > 0),
+                    key=lambda R: float((R * mean).sum()))
+    *axis, w = matrix_to_quaternion(T[:3, :3]).tolist()
+    if w == 1.0:
         return T, ''
-    T[:3, :3] = R
-    angle = round(math.degrees(math.acos((np.trace(R) - 1) / 2)))
-    values, vectors = np.linalg.eig(R)
-    axis = np.real(vectors[:, int(np.argmin(np.abs(values - 1)))])
-    axis = axis * math.copysign(1.0, axis[int(np.argmax(np.abs(axis)))])
-    if angle not in (0, 180):
-        spin = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-        axis = spin
     about = ' '.join(f'{"-" if value < 0 else "+"} {name}' for value, name in zip(axis, 'xyz')
                      if abs(value) > 1e-6).removeprefix('+ ')
-    return T, f'axes turned by {angle} deg about {about}'
+    return T, f'axes turned by {round(2 * math.degrees(math.acos(w)))} deg about {about}'
 
 
 def _fitted(ours: Array, robot: Array) -> Array:
@@ -213,16 +196,15 @@ def _error(T: Array, robot: Array) -> Array:
 
 
 def _small(step: Array) -> Array:
-    """Return the transform of a translation and a rotation vector (Rodrigues)."""
+    """Return the transform of a translation and a rotation vector."""
+    from icub_leg_fk.kinematics.rotation import turns_about
     import numpy as np
 
     angle = float(np.linalg.norm(step[3:]))
     T = np.eye(4)
     T[:3, 3] = step[:3]
     if angle:
-        x, y, z = step[3:] / angle
-        K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        T[:3, :3] += math.sin(angle) * K + (1 - math.cos(angle)) * (K @ K)
+        T[:3, :3] = turns_about(step[3:] / angle, angle)
     return T
 
 

@@ -189,15 +189,9 @@ def _rosbags() -> tuple[Any, Any]:
 
 
 def conclude(answers: Sequence[Answers], times: Sequence[float], whole: bool) -> int:
-    """Print the summary and return the exit status.
+    """Print the summary; return 0 if each message has its poses, 1 if not, 130 after Ctrl-C.
 
-    Args:
-        answers: the poses of each tip.
-        times: times of the messages sent [s].
-        whole: whether the recording was played to its end.
-
-    Returns:
-        0 if each message has exactly one pose per foot, 1 if not, or 130 after Ctrl-C.
+    `times` [s] are those of the messages sent, `whole` tells whether all were.
     """
     import numpy as np
 
@@ -225,16 +219,7 @@ def conclude(answers: Sequence[Answers], times: Sequence[float], whole: bool) ->
 
 
 class LiveTable:
-    """Shows the newest poses: on a terminal's second screen, elsewhere in a line a second.
-
-    Args:
-        answers: the poses, filled in by somebody else.
-        times: (N,) times of the messages [s].
-        frame: the frame the poses are in.
-
-    Attributes:
-        period: how often `show` should be called [s].
-    """
+    """Shows the newest poses every `period` [s]: on a terminal's second screen, else in lines."""
 
     def __init__(self, answers: Sequence[Answers], times: Sequence[float], frame: str) -> None:
         import numpy as np

@@ -58,10 +58,7 @@ class Answers:
 def stay_on_this_machine() -> str:
     """Set up the environment so that DDS reaches nobody else; return the ROS_DOMAIN_ID.
 
-    A domain that the user has chosen stays.
-
-    Raises:
-        LegFKError: it is one that DDS does not have.
+    A domain that the user has chosen stays, if it is one that DDS has.
     """
     if fault := unusable_domain():
         raise LegFKError(fault)
@@ -71,12 +68,7 @@ def stay_on_this_machine() -> str:
 
 
 class NodeProcess:
-    """A running `foot_pose_publisher`; use as a context manager.
-
-    Args:
-        namespace: its namespace.
-        parameters: its parameters, by name.
-    """
+    """A running `foot_pose_publisher`; use as a context manager."""
 
     def __init__(self, namespace: str, parameters: dict[str, str]) -> None:
         words = ['--ros-args', '-r', f'__ns:={namespace}']
@@ -122,14 +114,7 @@ class NodeProcess:
 class Replay:
     """Publishes joint states in their own timing and collects poses; use as a context manager.
 
-    Args:
-        recording: what to publish.
-        namespace: namespace of the node.
-        tips: tips whose poses to collect.
-
-    Attributes:
-        answers: what has come, per tip.
-        stamps: stamps of the messages published [ns].
+    `answers` has what has come, per tip, and `stamps` those of the messages published [ns].
     """
 
     def __init__(self, recording: JointRecording, namespace: str, tips: tuple[str, ...]) -> None:
@@ -181,13 +166,8 @@ class Replay:
         """Wait until the node and this process have found each other, in both directions.
 
         What this process has matched the node may not have yet. So, once matched here, single
-        messages are sent, which do not count, until each tip has answered one.
-
-        Args:
-            check: called again and again; raises if there is no hope.
-
-        Raises:
-            DemoError: they have not found each other in time.
+        messages are sent, which do not count, until each tip has answered one. `check` is called
+        again and again, and raises if there is no hope.
         """
         deadline, next_probe = time.monotonic() + _DISCOVERY_TIMEOUT, 0.0
         while len(self._answered_probe) < len(self.answers):
@@ -208,10 +188,8 @@ class Replay:
              ) -> None:
         """Publish every message at its time and wait for the poses.
 
-        Args:
-            on_time: called with the time since the first message [s], every `period` seconds.
-            period: see there.
-            check: called as often; raises if there is no hope.
+        Every `period` seconds, `on_time` is called with the time since the first message [s], and
+        `check`, which raises if there is no hope.
         """
         times = self._recording.times - self._recording.times[0]
         start, start_ns = time.monotonic(), time.time_ns()

@@ -20,7 +20,7 @@ from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.ros.configuration import SOLE_OUTLINE
 from icub_leg_fk.tools.output_file import check_target, whole_file
-from icub_leg_fk.tools.recording import ChainTrack
+from icub_leg_fk.tools.recording import ChainTrack, time_span
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -80,13 +80,7 @@ def _plain_matplotlib() -> Iterator[None]:
 
 
 def check_output(path: Path, force: bool) -> None:
-    """Refuse a picture that cannot be, before any work is done for it.
-
-    Raises:
-        MissingDependencyError: matplotlib is not installed.
-        OutputFileError: its format is unknown, it exists and `force` is not set, or its
-            directory does not exist.
-    """
+    """Refuse a picture that cannot be, before any work is done for it."""
     with _plain_matplotlib():
         pass
     if path.suffix.lower() not in FORMATS:
@@ -96,17 +90,7 @@ def check_output(path: Path, force: bool) -> None:
 
 
 def save_picture(draw: Callable[[], Figure], path: Path, *, force: bool, dpi: int = 150) -> None:
-    """Draw a picture and write it, whole or not at all.
-
-    Args:
-        draw: returns the figure.
-        path: file to write, in the format that its ending names.
-        force: whether an existing file is replaced.
-        dpi: pixels per inch of a PNG.
-
-    Raises:
-        OutputFileError: the file cannot be written.
-    """
+    """Draw a picture and write it in the format that its ending names, whole or not at all."""
     kind = path.suffix.lower().lstrip('.')
     # Without dates the same picture is the same file.
     metadata = {'svg': {'Date': None}, 'pdf': {'CreationDate': None}}.get(kind)
@@ -119,13 +103,9 @@ def save_picture(draw: Callable[[], Figure], path: Path, *, force: bool, dpi: in
 
 def feet_figure(tracks: Sequence[ChainTrack], instants: Sequence[float], title: str,
                 soles: Mapping[str, Chain]) -> Figure:
-    """Return the tips over time, and beside them the chains in space at some instants.
+    """Return the tips over time, and beside them the chains in space at up to four instants [s].
 
-    Args:
-        tracks: what the chains did; at least one sample each.
-        instants: times [s] at which to draw the chains, at most four.
-        title: what the picture shows.
-        soles: by name of a chain, the same chain down to its sole, whose outline is drawn.
+    The outline of a foot is drawn where `soles` has the same chain down to its sole, by name.
     """
     from matplotlib.figure import Figure
 
@@ -199,18 +179,8 @@ def color_of(chain: Chain) -> str:
 class Space:
     """A view of a part of space in parallel projection, in which every direction keeps its scale.
 
-    Args:
-        figure: the figure.
-        place: where in the figure, as `Figure.add_subplot` takes it.
-        points: (N, 3) what must be seen beside the root's axes, in the root frame [m].
-        azimuth: where the viewer stands, from the root's x toward its y [deg].
-        elevation: how high the viewer stands [deg].
-        zoom: how much of the place is filled.
-
-    Attributes:
-        axes: mplot3d's axes, bare.
-        step: from line to line of the floor [m]; what is drawn beside the chains grows with it.
-        low: height of the floor [m].
+    It shows `points` (N, 3) and the root's axes [m], from azimuth and elevation [deg], above a
+    floor with a line every `step` [m].
     """
 
     def __init__(self, figure: Figure, place: Any, points: Array, azimuth: float = 210.0,
@@ -309,8 +279,7 @@ def _draw_tips(panels: Sequence[Axes], tracks: Sequence[ChainTrack]) -> None:
         panel.set_title(f'{name} in {tracks[0].chain.root_frame} [m]', loc='left')
         panel.margins(x=0, y=0.12)
         panel.locator_params(axis='y', nbins=4)
-    start = min(float(track.times.min()) for track in tracks)
-    end = max(float(track.times.max()) for track in tracks)
+    start, end = time_span(tracks)
     panels[0].set_xlim((start, end) if end > start else (start - 0.5, end + 0.5))
     for panel in panels[1:]:
         panel.sharex(panels[0])

@@ -246,17 +246,9 @@ class Exact(Decimals):
 
 def work_out(version: ChainVersion, chain: Chain, foot_frame: str | None,
              q: Sequence[float] | None, exact: bool) -> Explanation:
-    """Work a chain out, step by step.
+    """Work a chain out, step by step, for a joint vector [rad or m] or, if None, for symbols.
 
-    Args:
-        version: the chain's version in its catalog.
-        chain: the chain with the tip frame asked for.
-        foot_frame: that tip frame, `dh` or `sole`; the first if None.
-        q: joint vector [rad or m], or None to keep the joints as symbols.
-        exact: whether numbers stay exact; they do where joints are symbols.
-
-    Raises:
-        MissingDependencyError: the answer is to be exact and sympy is not installed.
+    Numbers stay exact where joints are symbols, or on request, which needs sympy.
     """
     algebra = Exact() if exact or q is None else Decimals()
     steps = _steps(chain, q, algebra)

@@ -32,20 +32,12 @@ _BUMP = 64 * Polynomial([0, 1]) ** 3 * Polynomial([1, -1]) ** 3
 
 def walk(catalog: Catalog, version: str, seconds: float = 10.0,
          rate: float = 100.0) -> JointRecording:
-    """Return a walking gait of both legs.
+    """Return positions [rad] and velocities [rad/s] of both legs, walking with level soles.
 
-    Args:
-        catalog: where the chains `left_leg` and `right_leg` come from.
-        version: version of both legs.
-        seconds: duration [s].
-        rate: samples per second [Hz]; the period is rounded to whole samples.
-
-    Returns:
-        Positions [rad] and velocities [rad/s] of all twelve joints; the soles are level.
+    The gait's period is rounded to whole samples of the rate [Hz].
 
     Raises:
-        UnknownNameError: no such version.
-        LegFKError: this version's legs cannot walk like this within their documented ranges.
+        LegFKError: no such version, or its legs cannot walk like this within their ranges.
     """
     samples = max(2, round(PERIOD * rate))
     phases = np.arange(samples) / samples
@@ -90,16 +82,10 @@ def _posture(chain: Chain) -> Array:
 
 
 def _sole_path(standing: Array, ahead: float, phases: Array, period: float) -> tuple[Array, Array]:
-    """Plan one cycle; the foot stands in phases 0 to STANCE and swings from there to 1.
+    """Return (N, 3) positions [m] and velocities [m/s] in the root frame at (N,) phases.
 
-    Args:
-        standing: (3,) place of the sole around which it moves [m].
-        ahead: 1 if x of the root frame points forward, -1 if backward.
-        phases: (N,) phases, in periods.
-        period: duration of a cycle [s].
-
-    Returns:
-        (N, 3) positions [m] and (N, 3) velocities [m/s] in the root frame.
+    The foot moves around `standing` and stands in phases 0 to STANCE; `ahead` is 1 where x of the
+    root frame points forward, -1 where backward.
     """
     side = np.sign(standing[1])  # -1 left, +1 right
     phase = phases % 1.0

@@ -106,14 +106,7 @@ class CommandParser(Parser):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command.
-
-    Args:
-        argv: the words after `leg_fk`; those of the process if None.
-
-    Returns:
-        The exit status: 0, or 2 after a mistake, which is told in one line on stderr.
-    """
+    """Run the command; return 0, or 2 after a mistake, which is told in one line on stderr."""
     words = sys.argv[1:] if argv is None else list(argv)
     if '_ARGCOMPLETE' in os.environ:
         from argcomplete import autocomplete  # which set that variable

@@ -51,11 +51,7 @@ def whole_path(path: str | Path, *, force: bool,
 
 def check_target(path: str | Path, *, force: bool,
                  may_replace: Callable[[Path], bool] = Path.is_file) -> None:
-    """Refuse a target that `whole_path` would refuse, before any work is done.
-
-    Raises:
-        OutputFileError: it exists, or its directory does not.
-    """
+    """Refuse a target that `whole_path` would refuse, before any work is done."""
     target = Path(os.path.realpath(path))
     if not target.parent.is_dir():
         raise OutputFileError(f'{path}: there is no directory {target.parent}')
@@ -69,21 +65,13 @@ def check_target(path: str | Path, *, force: bool,
 
 @contextmanager
 def whole_file(path: str | Path, *, force: bool) -> Iterator[BinaryIO]:
-    """Give a stream to write a file with; the file is there when the block ends well.
-
-    Raises:
-        OutputFileError: as for `whole_path`.
-    """
+    """Give a stream to write a file with; the file is there when the block ends well."""
     with whole_path(path, force=force) as new, new.open('wb') as stream:
         yield stream
 
 
 def write_text(path: str | Path, text: str, *, force: bool) -> None:
-    """Write a text file, whole or not at all.
-
-    Raises:
-        OutputFileError: as for `whole_path`.
-    """
+    """Write a text file, whole or not at all."""
     with whole_file(path, force=force) as stream:
         stream.write(text.encode())
 

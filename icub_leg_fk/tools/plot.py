@@ -114,10 +114,10 @@ def default_instants(tracks: Sequence[ChainTrack]) -> list[float]:
     Of two feet those where one is highest above the other and farthest ahead of it, both ways;
     else, and if the feet hardly move, evenly spaced ones.
     """
+    from icub_leg_fk.tools.recording import time_span
     import numpy as np
 
-    start = min(float(track.times.min()) for track in tracks)
-    end = max(float(track.times.max()) for track in tracks)
+    start, end = time_span(tracks)
     if len(tracks) == 2 and all((np.diff(track.times) >= 0).all() for track in tracks):
         one, two = tracks
         apart = one.poses[:, :3] - np.stack(
@@ -167,8 +167,9 @@ def _read(path: Path, chains: Sequence[Chain], topic: str | None) -> Tracks:
 
 
 def _checked(instants: list[float], tracks: Sequence[ChainTrack]) -> list[float]:
-    start = min(float(track.times.min()) for track in tracks)
-    end = max(float(track.times.max()) for track in tracks)
+    from icub_leg_fk.tools.recording import time_span
+
+    start, end = time_span(tracks)
     for instant in instants:
         if not start <= instant <= end:
             raise LegFKError(f'--at: found {instant:g} s, allowed: {start:g} to {end:g} s')
@@ -178,8 +179,9 @@ def _checked(instants: list[float], tracks: Sequence[ChainTrack]) -> list[float]
 def _between(tracks: Sequence[ChainTrack], begin: float | None, end: float | None
              ) -> list[ChainTrack]:
     """Return the parts of the tracks from one time to another [s]."""
-    start = min(float(track.times.min()) for track in tracks)
-    stop = max(float(track.times.max()) for track in tracks)
+    from icub_leg_fk.tools.recording import time_span
+
+    start, stop = time_span(tracks)
     begin, end = start if begin is None else begin, stop if end is None else end
     inside = [(track.times >= begin) & (track.times <= end) for track in tracks]
     if not all(mask.any() for mask in inside):

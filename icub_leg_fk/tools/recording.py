@@ -85,6 +85,12 @@ class Tracks:
     poseless: list[str] = field(default_factory=list)
 
 
+def time_span(tracks: Sequence[ChainTrack]) -> tuple[float, float]:
+    """Return the first and the last time of some tracks [s]."""
+    return (min(float(track.times.min()) for track in tracks),
+            max(float(track.times.max()) for track in tracks))
+
+
 class _Clock:
     """Knows when the bag received the present message, for one without a stamp [ns]."""
 
@@ -94,13 +100,7 @@ class _Clock:
 def read_bag(path: Path, chains: Sequence[Chain], topic: str | None) -> Tracks:
     """Return what some chains did in a bag, by the node's own input rules.
 
-    Args:
-        path: directory of a rosbag2 bag, or one of its files.
-        chains: the chains wanted.
-        topic: topic of the joint states; None for `/joint_states`, or the only one there is.
-
-    Raises:
-        InputFileError: the bag cannot be read, has no such topic, or no chain has a pose.
+    The topic of the joint states is `/joint_states`, or the only one there is, if None.
     """
     from icub_leg_fk.ros.configuration import DEFAULT_TIMEOUT
     from icub_leg_fk.ros.joint_input import JointInput
@@ -139,14 +139,6 @@ def read_csv(path: str | Path, joint_names: Iterable[str]) -> JointRecording:
 
     Values are separated by commas, semicolons or tabs; the times are under `time`, `Time` or
     `timestamp`, and those since 1970 are taken from the first one on. Other columns are ignored.
-
-    Args:
-        path: the file.
-        joint_names: the joints wanted, each once.
-
-    Raises:
-        InputFileError: the file cannot be read, a column is missing or appears twice, or a value
-            is not what it must be; names file, line and column.
     """
     joints = tuple(joint_names)
     values = array('d')

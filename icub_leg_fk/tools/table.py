@@ -98,6 +98,7 @@ def run(args: argparse.Namespace) -> int:
 
 def largest_difference(chain: Chain, urdf: Urdf) -> tuple[float, float]:
     """Return how far a chain is from a URDF at most, of seeded random postures [m, rad]."""
+    from icub_leg_fk.kinematics.rotation import angle_between
     import numpy as np
 
     rng = np.random.default_rng(2955)
@@ -108,19 +109,11 @@ def largest_difference(chain: Chain, urdf: Urdf) -> tuple[float, float]:
     theirs = urdf.forward(chain.root_frame, chain.tip_frame,
                           dict(zip(chain.joint_names, Q.T, strict=True)))
     off = np.linalg.norm(ours[:, :3, 3] - theirs[:, :3, 3], axis=1)
-    # |R1 - R2| is 2 sqrt(2) sin(angle / 2), which unlike the trace is exact for small angles.
-    chord = np.linalg.norm(ours[:, :3, :3] - theirs[:, :3, :3], axis=(1, 2)) / math.sqrt(8)
-    return float(off.max()), float(2 * np.arcsin(np.minimum(chord, 1.0)).max())
+    return float(off.max()), float(angle_between(ours[:, :3, :3], theirs[:, :3, :3]).max())
 
 
 def table_text(urdf: Urdf, chains: list[Chain], tolerance: float) -> str:
-    """Return chains of a URDF as the text of a kinematics file.
-
-    Args:
-        urdf: where they come from.
-        chains: the chains.
-        tolerance: angle up to which axes were taken as parallel [rad].
-    """
+    """Return chains of a URDF as the text of a kinematics file."""
     lines = [f'# Denavit-Hartenberg tables of {_comment(urdf.name) or "a robot"}, made by '
              f'`leg_fk table` from {_comment(Path(urdf.file).name)}.',
              f'# Axes that are {tolerance:g} rad apart or less were taken as parallel.', '',

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 import json
 import math
+import re
 import textwrap
 from typing import Any
 
@@ -114,23 +115,15 @@ def json_text(value: Any) -> str:
         LegFKError: a number in it is infinite, which JSON cannot say.
     """
     try:
-        return _json(value, 0)
+        text = json.dumps(value, indent=2, allow_nan=False)
     except ValueError as error:
         raise LegFKError('found lengths too large to compute with') from error
+    return re.sub(r'\[\n\s*([^][{}]*?)\n\s*\]', _on_one_line, text)
 
 
-def _json(value: Any, depth: int) -> str:
-    flat = not isinstance(value, (dict, list)) or not any(
-        isinstance(item, (dict, list))
-        for item in (value.values() if isinstance(value, dict) else value))
-    if (flat and not isinstance(value, dict)) or not value:
-        return json.dumps(value, allow_nan=False)
-    inside, outside = '  ' * (depth + 1), '  ' * depth
-    if isinstance(value, dict):
-        items = [f'{json.dumps(key)}: {_json(item, depth + 1)}' for key, item in value.items()]
-        return '{\n' + ',\n'.join(inside + item for item in items) + f'\n{outside}}}'
-    items = [_json(item, depth + 1) for item in value]
-    return '[\n' + ',\n'.join(inside + item for item in items) + f'\n{outside}]'
+def _on_one_line(found: re.Match[str]) -> str:
+    words = re.sub(r'\n\s*', ' ', found[1])
+    return f'[{words}]'
 
 
 def _aligned(column: Sequence[str], centred: bool = False) -> list[str]:
