@@ -136,9 +136,9 @@ def test_poses_received_are_those_of_the_chains(version, foot_frame):
     catalog = Catalog.load()
     gait = walk(catalog, version, seconds=0.5)
     with replays.Replay(gait, namespace, TIPS) as replay, \
-            replays.NodeProcess(namespace, parameters) as node:
-        replay.wait_for_node(node.check)
-        replay.play(lambda elapsed: None, 0.1, node.check)
+            replays.running_node(namespace, parameters) as check:
+        replay.wait_for_node(check)
+        replay.play(lambda elapsed: None, 0.1, check)
     for answers, name, q in zip(replay.answers, ('left_leg', 'right_leg'),
                                 np.hsplit(gait.positions, 2)):
         T = catalog.chain(name, version, foot_frame).forward(q)
@@ -172,8 +172,8 @@ def test_nohup_is_respected():
 
 def test_node_that_refuses_its_parameters_is_one_line():
     with pytest.raises(replays.DemoError, match=r'exit status 1: .*v9.*v2_5'), \
-            replays.NodeProcess('/leg_fk_test', {'version': 'v9'}) as node:
-        wait_until(lambda: node.check())
+            replays.running_node('/leg_fk_test', {'version': 'v9'}) as check:
+        wait_until(check)
 
 
 def test_node_that_dies_is_one_line_and_exit_1():

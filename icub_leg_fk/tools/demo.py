@@ -38,9 +38,8 @@ examples:
 CHAINS = ('left_leg', 'right_leg')
 _INTERRUPTED = 128 + 2  # as a shell reports SIGINT
 _COLUMNS = ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
-_COLORS = {'left': '\x1b[38;5;97m', 'right': '\x1b[38;5;172m', 'faint': '\x1b[2m'}
-_SPARKS = '▁▂▃▄▅▆▇█'
-_LIFT = 0.05  # m; of a full spark
+_COLORS = {'left_foot': '\x1b[38;5;97m', 'right_foot': '\x1b[38;5;172m'}
+_FAINT = '\x1b[2m'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -117,7 +116,7 @@ def _recording(args: argparse.Namespace, catalog: Catalog, chains: Sequence[Chai
 def _play(args: argparse.Namespace, recording: JointRecording, chains: Sequence[Chain]
           ) -> tuple[Replay, bool]:
     """Play the recording; return what came of it, and whether it was played to its end."""
-    from icub_leg_fk.tools.demo_replay import DEPTH, NodeProcess, Replay
+    from icub_leg_fk.tools.demo_replay import DEPTH, Replay, running_node
 
     # What shall not be lost must be reliable, and may wait while the machine does other things.
     joint_states = f'qos_overrides.{_namespace()}/joint_states.subscription'
@@ -126,12 +125,13 @@ def _play(args: argparse.Namespace, recording: JointRecording, chains: Sequence[
     for chain in chains:
         pose = f'{_namespace()}/foot_pose_publisher/{chain.tip}/pose'
         parameters[f'qos_overrides.{pose}.publisher.depth'] = str(DEPTH)
+    seconds = float(recording.times[-1] - recording.times[0])
     with Replay(recording, _namespace(), tuple(chain.tip for chain in chains)) as replay, \
-            NodeProcess(_namespace(), parameters) as node:
-        replay.wait_for_node(node.check)
-        with LiveTable(replay.answers, recording.times.tolist(), chains[0].root_frame) as table:
+            running_node(_namespace(), parameters) as check:
+        replay.wait_for_node(check)
+        with LiveTable(replay.answers, seconds, chains[0].root_frame) as table:
             try:
-                replay.play(table.show, table.period, node.check)
+                replay.play(table.show, table.period, check)
                 return replay, True
             except KeyboardInterrupt:
                 return replay, False
@@ -221,15 +221,10 @@ def conclude(answers: Sequence[Answers], times: Sequence[float], whole: bool) ->
 class LiveTable:
     """Shows the newest poses every `period` [s]: on a terminal's second screen, else in lines."""
 
-    def __init__(self, answers: Sequence[Answers], times: Sequence[float], frame: str) -> None:
-        import numpy as np
-
-        self._answers = answers
-        self._times = np.asarray(times) - times[0]
-        self._frame = frame
+    def __init__(self, answers: Sequence[Answers], seconds: float, frame: str) -> None:
+        self._answers, self._seconds, self._frame = answers, seconds, frame
         self._live = sys.stdout.isatty() and os.environ.get('TERM', 'dumb') != 'dumb'
-        self._colored = self._live and not os.environ.get('NO_COLOR')
-        self._sparks = (sys.stdout.encoding or '').lower().replace('-', '') == 'utf8'
+        self._colored = not os.environ.get('NO_COLOR')
         self._elapsed = 0.0
         self.period = 0.1 if self._live else 1.0
 
@@ -240,82 +235,53 @@ class LiveTable:
 
     def __exit__(self, *_: object) -> None:
         if self._live:
-            self._write('\x1b[?25h\x1b[?1049l')
-            self._write(self._line(self._elapsed) + '\n')
+            self._write('\x1b[?25h\x1b[?1049l' + self._line())
 
     def show(self, elapsed: float) -> None:
         """Show the state at a time since the start [s]."""
         self._elapsed = elapsed
         if not self._live:
-            self._write(self._line(elapsed) + '\n')
+            self._write(self._line())
             return
         width, height = shutil.get_terminal_size()
-        lines = self._table(elapsed, width)
+        lines = self._table(width)
         if len(lines) > height:
-            lines = [*lines[:max(0, height - 1)], ('more rows: enlarge the terminal', 'faint')]
-        painted = [self._painted(line[:width], style) for line, style in lines]
+            lines = [*lines[:max(0, height - 1)], ('', 'more rows: enlarge the terminal')]
+        painted = (f'{_COLORS.get(tip, _FAINT)}{line[:width]}\x1b[0m' if self._colored
+                   else line[:width] for tip, line in lines)
         self._write('\x1b[H' + '\r\n'.join(f'{line}\x1b[K' for line in painted) + '\x1b[J')
 
-    def _line(self, elapsed: float) -> str:
+    def _line(self) -> str:
         feet = []
         for answers in self._answers:
-            name = answers.tip.replace('_', ' ')
             x, y, z = answers.poses[answers.newest, :3]
-            feet.append(f'{name}: x {x:+.4f}  y {y:+.4f}  z {z:+.4f} m' if answers.newest >= 0
-                        else f'{name}: no pose yet')
-        return f'{elapsed:7.2f} s   in {self._frame}: ' + '   '.join(feet)
+            feet.append(f'{_words(answers.tip)}: ' + (
+                f'x {x:+.4f}  y {y:+.4f}  z {z:+.4f} m' if answers.newest >= 0 else 'no pose yet'))
+        return f'{self._elapsed:7.2f} s   in {self._frame}: {"   ".join(feet)}\n'
 
-    def _table(self, elapsed: float, width: int) -> list[tuple[str, str]]:
+    def _table(self, width: int) -> list[tuple[str, str]]:
+        """Return the lines, as far as they fit, each with the tip it is about."""
         shown = _COLUMNS[:max(0, (width - 13) // 9)]
-        hidden = len(_COLUMNS) - len(shown)
-        lines = [(f'poses in {self._frame}, in m', 'faint'),
-                 (' ' * 12 + ''.join(f'{name:>9}' for name in shown), 'faint')]
+        lines = [('', f'poses in {self._frame}, in m'),
+                 ('', ' ' * 12 + ''.join(f'{name:>9}' for name in shown))]
         for answers in self._answers:
-            name = answers.tip.replace('_', ' ')
             newest = answers.poses[answers.newest].round(4) + 0.0  # no negative zeros
             numbers = (''.join(f'{value:9.4f}' for value in newest[:len(shown)].tolist())
                        if answers.newest >= 0 else '  no pose yet')
-            lines.append((f'{name:<12}{numbers}', name.split()[0]))
-        if hidden:
-            lines.append((f'{hidden} more columns: widen the terminal', 'faint'))
-        lines.append(('', ''))
-        bar = max(0, min(40, width - 40))
-        if self._sparks and bar:
-            for answers in self._answers:
-                name = answers.tip.replace('_', ' ')
-                lines.append((f'{name:<14}{self._heights(answers, bar)}  height, last 4 s',
-                              name.split()[0]))
-            lines.append(('', ''))
-        total = float(self._times[-1])
-        done = int(bar * (1.0 if total <= 0 else min(1.0, elapsed / total)))
-        full, rest = ('━', '─') if self._sparks else ('#', '.')
+            lines.append((answers.tip, f'{_words(answers.tip):<12}{numbers}'))
+        if hidden := len(_COLUMNS) - len(shown):
+            lines.append(('', f'{hidden} more columns: widen the terminal'))
         arrived = sum(answers.arrived for answers in self._answers)
-        lines.append((f'{elapsed:6.2f} s      {full * done}{rest * (bar - done)}  {arrived} poses',
-                      'faint'))
-        return lines
-
-    def _heights(self, answers: Answers, width: int) -> str:
-        """Return the foot's height over the last four seconds as a row of blocks."""
-        import numpy as np
-
-        if answers.newest < 0:
-            return ' ' * width
-        instants = self._times[answers.newest] + np.linspace(-3.9, 0, width)
-        rows = np.searchsorted(self._times, instants).clip(0, answers.newest)
-        low = min(np.nanmin(other.poses[:answers.newest + 1, 2]) for other in self._answers
-                  if other.newest >= 0)
-        levels = (answers.poses[rows, 2] - low) / _LIFT * (len(_SPARKS) - 1)
-        return ''.join(_SPARKS[round(min(max(level, 0), len(_SPARKS) - 1))]
-                       if instant >= 0 and level == level else ' '
-                       for instant, level in zip(instants, levels.tolist(), strict=True))
-
-    def _painted(self, line: str, style: str) -> str:
-        color = _COLORS.get(style, '') if self._colored else ''
-        return f'{color}{line}\x1b[0m' if color else line
+        return [*lines, ('', ''), ('', f'{self._elapsed:.2f} of {self._seconds:.2f} s, {arrived} '
+                                   'poses')]
 
     def _write(self, text: str) -> None:
         sys.stdout.write(text)
         sys.stdout.flush()
+
+
+def _words(name: str) -> str:
+    return name.replace('_', ' ')
 
 
 def _namespace() -> str:

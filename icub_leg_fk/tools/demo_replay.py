@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 import os
 import signal
 import subprocess
@@ -23,7 +25,7 @@ DEPTH = 1000  # messages that may wait anywhere when a process is held up
 _DISCOVERY_TIMEOUT = 20.0  # s
 _LAST_POSE_TIMEOUT = 5.0  # s without a pose, after the last message
 _STOP_TIMEOUT = 10.0  # s
-_PROBE_PERIOD = 0.1  # s
+_PROBE, _PROBE_PERIOD = -1, 0.1  # stands for its message's index; s
 _HIGHEST_DOMAIN = 101  # beyond it DDS's ports meet those that Linux hands out
 
 
@@ -67,48 +69,41 @@ def stay_on_this_machine() -> str:
     return os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % _HIGHEST_DOMAIN))
 
 
-class NodeProcess:
-    """A running `foot_pose_publisher`; use as a context manager."""
+@contextmanager
+def running_node(namespace: str, parameters: dict[str, str]) -> Iterator[Callable[[], None]]:
+    """Run `foot_pose_publisher` in a process of its own.
 
-    def __init__(self, namespace: str, parameters: dict[str, str]) -> None:
-        words = ['--ros-args', '-r', f'__ns:={namespace}']
-        for name, value in parameters.items():
-            words += ['-p', f'{name}:={value}']
-        self._words = (sys.executable, '-m', 'icub_leg_fk.ros.main', *words)
-        self._log = tempfile.TemporaryFile()
-        self._process: subprocess.Popen[bytes] | None = None
+    Gives what raises `DemoError` once the node has stopped by itself.
+    """
+    words = ['--ros-args', '-r', f'__ns:={namespace}']
+    for name, value in parameters.items():
+        words += ['-p', f'{name}:={value}']
+    process: subprocess.Popen[bytes] | None = None
 
-    def __enter__(self) -> NodeProcess:
+    def check() -> None:
+        if process is not None and (status := process.poll()) is not None:
+            log.seek(0)
+            said = log.read().decode(errors='replace').strip() or 'it said nothing'
+            raise DemoError(f'the node stopped with exit status {status}: '
+                            f'{said.splitlines()[-1].strip()}')
+
+    with tempfile.TemporaryFile() as log:
         try:
             with held_signals():  # the node must not get away between its start and the next line
                 # A session of its own: Ctrl-C reaches the demonstration, which stops the node.
-                self._process = subprocess.Popen(
-                    self._words, stdin=subprocess.DEVNULL, stdout=self._log, stderr=self._log,
-                    start_new_session=True)
-        except BaseException:
-            self.__exit__()
-            raise
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        with held_signals():
-            if self._process is not None:
-                if self._process.poll() is None:
-                    self._process.send_signal(signal.SIGINT)
-                try:
-                    self._process.wait(_STOP_TIMEOUT)
-                except subprocess.TimeoutExpired:
-                    self._process.kill()
-                    self._process.wait()
-            self._log.close()
-
-    def check(self) -> None:
-        """Raise the error if the node has stopped by itself."""
-        if self._process is not None and (status := self._process.poll()) is not None:
-            self._log.seek(0)
-            said = self._log.read().decode(errors='replace').strip() or 'it said nothing'
-            raise DemoError(f'the node stopped with exit status {status}: '
-                            f'{said.splitlines()[-1].strip()}')
+                process = subprocess.Popen(
+                    [sys.executable, '-m', 'icub_leg_fk.ros.main', *words],
+                    stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True)
+            yield check
+        finally:
+            with held_signals():
+                if process is not None:
+                    process.send_signal(signal.SIGINT)
+                    try:
+                        process.wait(_STOP_TIMEOUT)
+                    except subprocess.TimeoutExpired:
+                        process.kill()
+                        process.wait()
 
 
 class Replay:
@@ -124,14 +119,12 @@ class Replay:
         self.answers = [Answers(tip, np.full((count, 7), np.nan), np.full(count, np.nan))
                         for tip in tips]
         self.stamps: list[int] = []
-        self._published = np.zeros(count)
-        self._message_of: dict[int, int] = {}  # by stamp [ns]
-        self._last_stamp = 0
-        self._probes: set[int] = set()
-        self._answered_probe: set[str] = set()
+        self._sent: dict[int, tuple[int, float]] = {}  # by stamp [ns]: which message, and when
+        self._found: set[str] = set()
 
     def __enter__(self) -> Replay:
         try:
+            from geometry_msgs.msg import PoseStamped
             import rclpy
             from rclpy.context import Context
             from rclpy.executors import SingleThreadedExecutor
@@ -154,7 +147,10 @@ class Replay:
         self._executor.add_node(self._node)
         self._joint_state = JointState
         self._publisher = self._node.create_publisher(JointState, 'joint_states', DEPTH)
-        self._subscriptions = [self._subscribe(answers) for answers in self.answers]
+        for answers in self.answers:
+            self._node.create_subscription(
+                PoseStamped, f'foot_pose_publisher/{answers.tip}/pose',
+                partial(self._take, answers), DEPTH)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -165,23 +161,20 @@ class Replay:
     def wait_for_node(self, check: Callable[[], None]) -> None:
         """Wait until the node and this process have found each other, in both directions.
 
-        What this process has matched the node may not have yet. So, once matched here, single
-        messages are sent, which do not count, until each tip has answered one. `check` is called
-        again and again, and raises if there is no hope.
+        To that end, single messages are sent, which do not count, until each tip has answered
+        one. `check` is called again and again, and raises if there is no hope.
         """
         deadline, next_probe = time.monotonic() + _DISCOVERY_TIMEOUT, 0.0
-        while len(self._answered_probe) < len(self.answers):
+        while len(self._found) < len(self.answers):
             check()
             now = time.monotonic()
             if now > deadline:
                 hint = '' if loopback_is_up() else f': {LOOPBACK_IS_DOWN}'
                 raise DemoError(f'the node was not found over DDS in {_DISCOVERY_TIMEOUT:g} s'
                                 f'{hint}')
-            if self._matched() and now >= next_probe:
+            if now >= next_probe:
                 next_probe = now + _PROBE_PERIOD
-                stamp = time.time_ns()
-                self._probes.add(stamp)
-                self._publish(stamp, 0)
+                self._publish(time.time_ns(), _PROBE)
             self._spin(0.02)
 
     def play(self, on_time: Callable[[float], None], period: float, check: Callable[[], None]
@@ -202,16 +195,14 @@ class Replay:
                     on_time(now - start)
                 # A negative timeout would be none.
                 self._spin(max(min(start + offset, next_call) - now, 0.0))
-            stamp = max(start_ns + round(offset * 1e9), self._last_stamp + 1)
-            self._message_of[stamp] = index
-            self._published[index] = time.monotonic()
-            self._publish(stamp, index)
-            self.stamps.append(stamp)
+            before = next(reversed(self._sent), 0)
+            self.stamps.append(max(start_ns + round(offset * 1e9), before + 1))
+            self._publish(self.stamps[-1], index)
+        wanted = len(times) * len(self.answers)
         arrived, deadline = -1, 0.0
-        while (now_arrived := sum(a.arrived for a in self.answers)) < len(times) * len(
-                self.answers):
-            if now_arrived > arrived:
-                arrived, deadline = now_arrived, time.monotonic() + _LAST_POSE_TIMEOUT
+        while (arrived_now := sum(answers.arrived for answers in self.answers)) < wanted:
+            if arrived_now > arrived:
+                arrived, deadline = arrived_now, time.monotonic() + _LAST_POSE_TIMEOUT
             if time.monotonic() > deadline:
                 break
             check()
@@ -223,39 +214,28 @@ class Replay:
         with held_signals():
             self._executor.spin_once(timeout_sec=seconds)
 
-    def _matched(self) -> bool:
-        return self._publisher.get_subscription_count() > 0 and all(
-            self._node.count_publishers(subscription.topic_name)
-            for subscription in self._subscriptions)
-
-    def _subscribe(self, answers: Answers) -> Any:
-        from geometry_msgs.msg import PoseStamped
-
-        def take(message: PoseStamped) -> None:
-            now = time.monotonic()
-            stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
-            if stamp in self._probes:
-                self._answered_probe.add(answers.tip)
-                return
-            index = self._message_of.get(stamp, -1)
-            if index < 0 or not np.isnan(answers.latencies[index]):
-                answers.unexpected += 1
-                return
+    def _take(self, answers: Answers, message: Any) -> None:
+        now = time.monotonic()
+        stamp = message.header.stamp
+        index, sent = self._sent.get(stamp.sec * 1_000_000_000 + stamp.nanosec, (None, now))
+        if index == _PROBE:
+            self._found.add(answers.tip)
+        elif index is None or not np.isnan(answers.latencies[index]):
+            answers.unexpected += 1
+        else:
             p, q = message.pose.position, message.pose.orientation
             answers.poses[index] = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
-            answers.latencies[index] = now - self._published[index]
+            answers.latencies[index] = now - sent
             answers.newest = index
 
-        topic = f'foot_pose_publisher/{answers.tip}/pose'
-        return self._node.create_subscription(PoseStamped, topic, take, DEPTH)
-
     def _publish(self, stamp: int, index: int) -> None:
+        row = max(index, 0)
         message = self._joint_state()
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
         message.name = list(self._recording.joint_names)
-        message.position = self._recording.positions[index].tolist()
+        message.position = self._recording.positions[row].tolist()
         if self._recording.velocities is not None:
-            message.velocity = self._recording.velocities[index].tolist()
-        self._last_stamp = stamp
+            message.velocity = self._recording.velocities[row].tolist()
+        self._sent[stamp] = index, time.monotonic()
         with held_signals():
             self._publisher.publish(message)
