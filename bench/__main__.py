@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+from importlib import import_module
 from importlib.util import find_spec
 import os
 import sys
 
-PARTS = ('start', 'kinematics', 'node', 'bag')
+PARTS = {'start': 'kinematics_bench', 'kinematics': 'kinematics_bench', 'node': 'node_bench',
+         'bag': 'bag_bench'}
 NEEDS = {'node': ('rclpy', 'sensor_msgs'), 'bag': ('rosbags',)}
 _QUIET_LOAD = 0.5  # processes; what else runs shows in every figure
 
@@ -22,7 +24,7 @@ def main() -> int:
     parser.add_argument('--check', action='store_true',
                         help='exit status 1 if a promise is missed')
     args = parser.parse_args()
-    if unknown := set(args.parts) - set(PARTS):
+    if unknown := set(args.parts) - PARTS.keys():
         parser.error(f'found part {", ".join(sorted(unknown))}, allowed: {", ".join(PARTS)}')
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
@@ -36,21 +38,10 @@ def main() -> int:
         if missing:
             report.section(f'{part}: not measured, without {", ".join(missing)}')
         else:
-            _measure(part, report, args.quick)
+            measure = getattr(import_module(f'bench.{PARTS[part]}'), f'measure_{part}')
+            measure(report, args.quick)
     print(f'\n{report.verdict()}')
     return int(args.check and not all(promise.is_kept for promise in report.promises))
-
-
-def _measure(part: str, report: object, quick: bool) -> None:
-    if part == 'node':
-        from bench.node_bench import measure_node as measure
-    elif part == 'bag':
-        from bench.bag_bench import measure_bag as measure
-    elif part == 'start':
-        from bench.kinematics_bench import measure_start as measure
-    else:
-        from bench.kinematics_bench import measure_kinematics as measure
-    measure(report, quick)
 
 
 if __name__ == '__main__':

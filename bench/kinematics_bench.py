@@ -1,4 +1,4 @@
-"""One pose and many poses beside Pinocchio, PyKDL and roboticstoolbox; `leg_fk pose`'s start."""
+"""One pose and many poses beside Pinocchio and roboticstoolbox; `leg_fk pose`'s start."""
 
 from __future__ import annotations
 
@@ -43,48 +43,48 @@ def measure_kinematics(report: Report, quick: bool) -> None:
     chain = Catalog.load().chain('left_leg', 'v2_5', 'dh')
     Q = np.random.default_rng(5).uniform(chain.lower, chain.upper, (_MANY, chain.n))
     few = Q[:100] if quick else Q[:1000]
-    lists = few.tolist()
     report.section('kinematics: left_leg v2_5, pose with quaternion')
-    one: dict[str, list[float]] = {'here': []}
-    peers: dict[str, tuple[One, Any]] = {}
-    for name, make in (('Pinocchio', _pinocchio), ('PyKDL', _pykdl),
-                       ('roboticstoolbox', _roboticstoolbox)):
+    ways: dict[str, tuple[One, Any]] = {'here': (chain.pose, few.tolist())}
+    for name, make, count in (('Pinocchio', _pinocchio, len(few)),
+                              ('roboticstoolbox', _roboticstoolbox, 20)):
         try:
-            peers[name] = make(chain, few)
+            ways[name] = make(chain, few), list(few[:count])
         except ImportError as error:
             report.note(f'{name}: not measured: {error}')
-    one |= {name: [] for name in peers}
-    many: list[float] = []
-    loop: list[float] = []
+    one: dict[str, list[float]] = {name: [] for name in ways}
+    many, loop = [], []
+    out = np.empty((len(few), 7))
     for _ in range(3 if quick else _READINGS):
-        one['here'].append(_microseconds(chain.pose, lists))
-        for name, (pose, vectors) in peers.items():
-            one[name].append(_microseconds(pose, vectors[:20] if name == 'roboticstoolbox'
-                                           else vectors))
-        began = time.perf_counter()
-        chain.poses(Q)
-        many.append((time.perf_counter() - began) / len(Q) * 1e6)
-        if 'Pinocchio' in peers:
-            pose, vectors = peers['Pinocchio']
-            out = np.empty((len(few), 7))
-            began = time.perf_counter()
-            for i, q in enumerate(vectors):
-                out[i] = pose(q)
-            loop.append((time.perf_counter() - began) / len(few) * 1e6)
+        for name, (pose, vectors) in ways.items():
+            one[name].append(_microseconds(len(vectors), _each, pose, vectors))
+        many.append(_microseconds(len(Q), chain.poses, Q))
+        if 'Pinocchio' in ways:
+            pose, vectors = ways['Pinocchio']
+            loop.append(_microseconds(len(few), _fill, out, pose, vectors))
     for name, readings in one.items():
         report.row(f'one pose, {name}', readings, 'us')
     report.row('many poses, each, here', many, 'us')
-    if 'Pinocchio' in peers:
+    if loop:
         report.row('many poses, each, a loop over Pinocchio', loop, 'us')
         report.row('one pose / Pinocchio', ratio(one['here'], one['Pinocchio']), 'x', at_most=4.5)
         report.row('many poses, loop over Pinocchio / here', ratio(loop, many), 'x', at_least=8.0)
 
 
-def _microseconds(pose: One, vectors: Any) -> float:
-    began = time.perf_counter()
+def _each(pose: One, vectors: Any) -> None:
     for q in vectors:
         pose(q)
-    return (time.perf_counter() - began) / len(vectors) * 1e6
+
+
+def _fill(out: Any, pose: One, vectors: Any) -> None:
+    for i, q in enumerate(vectors):
+        out[i] = pose(q)
+
+
+def _microseconds(count: int, work: Callable[..., object], *arguments: Any) -> float:
+    """Return what each of so many things costs that are worked on."""
+    began = time.perf_counter()
+    work(*arguments)
+    return (time.perf_counter() - began) / count * 1e6
 
 
 def _check(chain: Chain, q: Any, T: Any) -> None:
@@ -93,7 +93,7 @@ def _check(chain: Chain, q: Any, T: Any) -> None:
         raise AssertionError(f'computes another robot, {error:.1e} off')
 
 
-def _pinocchio(chain: Chain, Q: Any) -> tuple[One, Any]:
+def _pinocchio(chain: Chain, Q: Any) -> One:
     import pinocchio as pin
     model = pin.Model()
     joint, before = 0, pin.SE3(chain.T_root_0)
@@ -110,35 +110,10 @@ def _pinocchio(chain: Chain, Q: Any) -> tuple[One, Any]:
         return pin.SE3ToXYZQUAT(pin.updateFramePlacement(model, data, tip))
     pose(Q[0])
     _check(chain, Q[0], data.oMf[tip].homogeneous)
-    return pose, list(Q)
+    return pose
 
 
-def _pykdl(chain: Chain, Q: Any) -> tuple[One, Any]:
-    import PyKDL as kdl
-    root = chain.T_root_0
-    robot = kdl.Chain()
-    robot.addSegment(kdl.Segment(kdl.Joint(kdl.Joint.Fixed), kdl.Frame(
-        kdl.Rotation(*root[:3, :3].ravel().tolist()), kdl.Vector(*root[:3, 3].tolist()))))
-    for link in chain.links:
-        robot.addSegment(kdl.Segment(kdl.Joint(kdl.Joint.RotZ),
-                                     kdl.Frame.DH(link.a, link.alpha, link.d, link.offset)))
-    solver, frame = kdl.ChainFkSolverPos_recursive(robot), kdl.Frame()
-    vectors = []
-    for values in Q.tolist():
-        q = kdl.JntArray(len(values))
-        for i, value in enumerate(values):
-            q[i] = value
-        vectors.append(q)
-
-    def pose(q: Any) -> Any:
-        solver.JntToCart(q, frame)
-        return frame.p, frame.M.GetQuaternion()
-    pose(vectors[0])
-    _check(chain, Q[0], [[frame[i, j] for j in range(4)] for i in range(3)] + [[0, 0, 0, 1]])
-    return pose, vectors
-
-
-def _roboticstoolbox(chain: Chain, Q: Any) -> tuple[One, Any]:
+def _roboticstoolbox(chain: Chain, Q: Any) -> One:
     import roboticstoolbox as rtb
     from spatialmath import SE3, UnitQuaternion
     robot = rtb.DHRobot([rtb.RevoluteDH(a=link.a, d=link.d, alpha=link.alpha, offset=link.offset)
@@ -148,4 +123,4 @@ def _roboticstoolbox(chain: Chain, Q: Any) -> tuple[One, Any]:
     def pose(q: Any) -> Any:
         T = robot.fkine(q)
         return T.t, UnitQuaternion(T)
-    return pose, list(Q)
+    return pose

@@ -15,18 +15,13 @@ from typing import Any
 
 from bench.joint_messages import joint_names, joint_positions
 
-STAMP = struct.Struct('<iI')
-STAMP_AT = 4  # behind the CDR encapsulation
+_STAMP, _STAMP_AT = struct.Struct('<iI'), 4  # behind the CDR encapsulation
 _GAIT_MESSAGES = 100
 _MATCH_TIMEOUT = 60.0  # s
 
 
 class Process:
-    """A spawned process that answers commands.
-
-    Args:
-        target: the function to run in it, called with a connection.
-    """
+    """A spawned process that answers commands; `target` is called with a connection."""
 
     def __init__(self, target: Any) -> None:
         context = get_context('spawn')
@@ -48,15 +43,13 @@ class Process:
 def robot(connection: Connection) -> None:
     """Publish JointStates, as told.
 
-    Commands are `match` with a topic, which waits for a subscriber and tells how many there are;
-    `send` with topic, joints, rate [Hz] and count, which tells the stamps [ns]; `close` with a
-    topic.
+    Commands are `match` with a topic, which waits for a subscriber and tells how many there are,
+    and `send` with topic, joints, rate [Hz] and count, which tells the times [ns].
     """
     from rclpy.serialization import serialize_message
     from sensor_msgs.msg import JointState
     node, qos = _node('robot')
     publishers: dict[str, Any] = {}
-    gaits: dict[int, list[bytearray]] = {}
     while True:
         command, topic, *arguments = connection.recv()
         if topic not in publishers:
@@ -67,17 +60,13 @@ def robot(connection: Connection) -> None:
             while publisher.get_subscription_count() < 1 and time.monotonic() < deadline:
                 time.sleep(0.01)
             connection.send(publisher.get_subscription_count())
-        elif command == 'send':
-            joints, rate, count = arguments
-            if joints not in gaits:
-                gaits[joints] = [bytearray(serialize_message(JointState(
-                    name=joint_names(joints), velocity=[0.0] * joints, effort=[0.0] * joints,
-                    position=joint_positions(joints, 2 * math.pi * i / _GAIT_MESSAGES))))
-                    for i in range(_GAIT_MESSAGES)]
-            connection.send(_send(publisher.publish, gaits[joints], rate, count))
         else:
-            node.destroy_publisher(publishers.pop(topic))
-            connection.send(None)
+            joints, rate, count = arguments
+            gait = [bytearray(serialize_message(JointState(
+                name=joint_names(joints), velocity=[0.0] * joints, effort=[0.0] * joints,
+                position=joint_positions(joints, 2 * math.pi * i / _GAIT_MESSAGES))))
+                for i in range(_GAIT_MESSAGES)]
+            connection.send(_send(publisher.publish, gait, rate, count))
 
 
 def _send(publish: Any, messages: list[bytearray], rate: float, count: int) -> list[int]:
@@ -86,67 +75,57 @@ def _send(publish: Any, messages: list[bytearray], rate: float, count: int) -> l
     On a machine that falls asleep between two messages, waking it up would be most of the cost of
     every node.
     """
-    stamps = []
-    period = 1.0 / rate
+    times = []
     gc.disable()
     due = time.perf_counter()
     for i in range(count):
         while time.perf_counter() < due:
             pass
-        due += period
-        message = messages[i % _GAIT_MESSAGES]
-        stamp = time.time_ns()
-        STAMP.pack_into(message, STAMP_AT, *divmod(stamp, 1_000_000_000))
+        due += 1.0 / rate
+        message, now = messages[i % _GAIT_MESSAGES], time.time_ns()
+        _STAMP.pack_into(message, _STAMP_AT, *divmod(now, 1_000_000_000))
         publish(bytes(message))
-        stamps.append(stamp)
+        times.append(now)
     gc.enable()
-    return stamps
+    return times
 
 
 def observer(connection: Connection) -> None:
     """Subscribe to poses and twists, as told.
 
-    Commands are `watch` and `drop` with a topic, and `take` with topic, count and time [s], which
-    tells the (stamp, time of arrival) [ns] of what has come, once there are so many or none has
-    come for so long.
+    Commands are `watch` with a topic, and `take` with topic, count and time [s], which tells when
+    [ns] what has come did, once there are so many or none has come for so long.
     """
     from geometry_msgs.msg import PoseStamped, TwistStamped
     from rclpy.experimental.events_executor import EventsExecutor
     node, qos = _node('observer')
     executor = EventsExecutor()
     executor.add_node(node)
-    received: dict[str, list[tuple[int, bytes]]] = {}
-    subscriptions: dict[str, Any] = {}
+    arrivals: dict[str, list[int]] = {}
 
     def watch(topic: str) -> None:
-        arrived = received[topic] = []
-        subscriptions[topic] = node.create_subscription(
+        arrived = arrivals[topic] = []
+        node.create_subscription(
             TwistStamped if topic.endswith('/twist') else PoseStamped, topic,
-            lambda data: arrived.append((time.time_ns(), data)), qos, raw=True)
+            lambda data: arrived.append(time.time_ns()), qos, raw=True)
 
-    def take(topic: str, count: int, quiet: float) -> list[tuple[int, int]]:
-        arrived = received[topic]
+    def take(topic: str, count: int, quiet: float) -> list[int]:
+        arrived = arrivals[topic]
         seen, since = -1, time.monotonic()
         while len(arrived) < count and time.monotonic() - since < quiet:
             executor.spin_once(timeout_sec=0.02)
             if len(arrived) != seen:
                 seen, since = len(arrived), time.monotonic()
-        taken = [(sec * 1_000_000_000 + nanosec, at) for at, (sec, nanosec) in (
-            (at, STAMP.unpack_from(data, STAMP_AT)) for at, data in arrived)]
+        taken = list(arrived)
         arrived.clear()
         return taken
 
-    def drop(topic: str) -> None:
-        node.destroy_subscription(subscriptions.pop(topic))
-        del received[topic]
-
-    commands = {'watch': watch, 'take': take, 'drop': drop}
     gc.disable()
     while True:
         executor.spin_once(timeout_sec=0.01)
         if connection.poll():
             command, *arguments = connection.recv()
-            connection.send(commands[command](*arguments))
+            connection.send({'watch': watch, 'take': take}[command](*arguments))
 
 
 def _node(name: str) -> tuple[Any, Any]:

@@ -6,72 +6,121 @@ meets all of them; every ratio is of two stretches that followed one another.
 
 from __future__ import annotations
 
-from contextlib import closing, ExitStack
+from collections.abc import Sequence
+from contextlib import closing
+import subprocess
+import sys
+from typing import NamedTuple
 
-from bench.node_process import Bench, NodeProcess, POSES, Stretch, TWISTS
-from bench.report import percentile, ratio, Report
+from bench.load import observer, Process, robot
+from bench.report import cpu_ns, percentile, ratio, Report, resident_bytes
 
+POSES = ('left_foot/pose', 'right_foot/pose')
+TWISTS = ('left_foot/twist', 'right_foot/twist')
 _JOINTS = 32
 _RATE = 1000.0  # Hz
-_RAMP = 1.25
-_FASTEST = 60000.0  # Hz
-_COMPARED = ('floor', 'ours', 'plain')
+_DEPTH = 1000
+_QUIET = 5.0  # s without a message after which no more are waited for
+_SOON = 0.5  # s, likewise for tries
+_TRIES = 5  # messages sent at a time to see whether they are answered
+
+
+class Stretch(NamedTuple):
+    """CPU time per message, and message sent to pose received, of all poses [us]."""
+
+    cpu: float
+    latencies: list[float]
+
+
+class NodeProcess:
+    """A node in a process and namespace of its own: ours, or a reference node by its name."""
+
+    def __init__(self, namespace: str, name: str = 'ours', outputs: Sequence[str] = POSES,
+                 parameters: Sequence[str] = ()) -> None:
+        self.joint_topic = f'/{namespace}/joint_states'
+        self.topics = [f'/{namespace}/foot_pose_publisher/{output}' for output in outputs]
+        module = ['icub_leg_fk.ros.main'] if name == 'ours' else ['bench.reference_nodes', name]
+        words = ['--ros-args', '-r', f'__ns:=/{namespace}', '--log-level', 'fatal']
+        if name == 'ours':
+            joints = f'qos_overrides.{self.joint_topic}.subscription'
+            for parameter in (*parameters, f'{joints}.reliability:=reliable',
+                              f'{joints}.depth:={_DEPTH}',
+                              *(f'qos_overrides.{topic}.publisher.depth:={_DEPTH}'
+                                for topic in self.topics)):
+                words += ['-p', parameter]
+        self._process = subprocess.Popen([sys.executable, '-m', *module, *words])
+        self.pid = self._process.pid
+
+    def close(self) -> None:
+        """End the process."""
+        self._process.terminate()
+        try:
+            self._process.wait(timeout=5.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
 
 
 def measure_node(report: Report, quick: bool) -> None:
-    """Add CPU, latency, memory, and the first rate at which a pose is lost."""
-    with closing(Bench()) as bench:
-        _measure_side_by_side(report, bench, *((2, 50) if quick else (12, 1000)))
-        _measure_saturation(report, bench, quick)
-
-
-def _measure_side_by_side(report: Report, bench: Bench, rounds: int, messages: int) -> None:
-    with ExitStack() as stack:
-        nodes = {name: stack.enter_context(closing(node.start())) for name, node in {
-            'floor': NodeProcess('floor', 'floor'),
-            'ours': NodeProcess('ours', 'ours'),
-            'plain': NodeProcess('plain', 'plain'),
-            'twists': NodeProcess('twists', 'ours', (*POSES, *TWISTS), ('publish_twist:=true',)),
-        }.items()}
-        bench.match([*nodes.values()])
-        turns: dict[str, list[Stretch]] = {name: [] for name in (*_COMPARED, 'twists')}
-        for turn in range(rounds):  # forth and back, so that none is always first
-            for name in turns if turn % 2 == 0 else reversed(turns):
-                turns[name].append(bench.stretch(nodes[name], _JOINTS, _RATE, messages))
-        resident = {name: node.resident_bytes() / 1e6 for name, node in nodes.items()}
-        for node in nodes.values():
-            bench.forget(node)
-    cpu = {name: [turn.cpu for turn in stretches] for name, stretches in turns.items()}
-    p50, p99 = ({name: [percentile(turn.latencies, percent) for turn in turns[name]]
-                 for name in _COMPARED} for percent in (50, 99))
+    """Add CPU, latency and memory."""
+    turns, messages = (2, 50) if quick else (12, 1000)
+    nodes: dict[str, NodeProcess] = {}
+    with closing(Process(robot)) as sender, closing(Process(observer)) as receiver:
+        try:
+            nodes |= {'floor': NodeProcess('floor', 'floor'), 'here': NodeProcess('here'),
+                      'plain': NodeProcess('plain', 'plain'),
+                      'here, with two twists': NodeProcess(
+                          'twists', 'ours', (*POSES, *TWISTS), ('publish_twist:=true',))}
+            _match(sender, receiver, nodes.values())
+            stretches: dict[str, list[Stretch]] = {name: [] for name in nodes}
+            for turn in range(turns):  # forth and back, so that none is always first
+                for name in nodes if turn % 2 == 0 else reversed(nodes):
+                    stretches[name].append(_stretch(sender, receiver, nodes[name], messages))
+            resident = {name: resident_bytes(node.pid) / 1e6 for name, node in nodes.items()}
+        finally:
+            for node in nodes.values():
+                node.close()
+    cpu = {name: [turn.cpu for turn in of_name] for name, of_name in stretches.items()}
+    p50, p99 = ({name: [percentile(turn.latencies, percent) for turn in of_name]
+                 for name, of_name in stretches.items()} for percent in (50, 99))
     report.section(f'node: CPU per message, two feet, {_RATE:.0f} Hz, {_JOINTS} joints')
-    for name in (*_COMPARED, 'twists'):
-        label = {'ours': 'here', 'twists': 'here, with two twists'}.get(name, name)
-        report.row(f'CPU, {label}', cpu[name], 'us')
-    report.row('CPU, here / floor', ratio(cpu['ours'], cpu['floor']), 'x', at_most=1.3)
-    report.row('CPU, here / plain', ratio(cpu['ours'], cpu['plain']), 'x', at_most=0.32)
-    report.section('node: latency, JointState sent to PoseStamped received')
-    for name in _COMPARED:
-        label = 'here' if name == 'ours' else name
-        report.row(f'p50, {label}', p50[name], 'us')
-        report.row(f'p99, {label}', p99[name], 'us')
-    report.row('p50, here / floor', ratio(p50['ours'], p50['floor']), 'x', at_most=1.2)
-    report.section('node: resident size')
-    for name in _COMPARED:
-        report.row('here' if name == 'ours' else name, [resident[name]], 'MB')
+    for name in nodes:
+        report.row(f'CPU, {name}', cpu[name], 'us')
+    report.row('CPU, here / floor', ratio(cpu['here'], cpu['floor']), 'x', at_most=1.3)
+    report.row('CPU, here / plain', ratio(cpu['here'], cpu['plain']), 'x', at_most=0.32)
+    report.section('node: latency, JointState sent to PoseStamped received; resident size')
+    for name in ('floor', 'here', 'plain'):
+        report.row(f'p50, {name}', p50[name], 'us')
+        report.row(f'p99, {name}', p99[name], 'us')
+        report.row(f'resident, {name}', [resident[name]], 'MB')
+    report.row('p50, here / floor', ratio(p50['here'], p50['floor']), 'x', at_most=1.2)
 
 
-def _measure_saturation(report: Report, bench: Bench, quick: bool) -> None:
-    report.section('node: reliable QoS, every pose in order')
-    with closing(NodeProcess('fast', 'ours').start()) as node:
-        bench.match([node])
-        rate = 2000.0
-        while rate < (2100.0 if quick else _FASTEST):
-            stretch = bench.stretch(node, _JOINTS, rate, round(rate))
-            if stretch.lost or not stretch.in_order:
-                report.row('first rate at which a pose is lost', [rate], 'Hz')
+def _match(sender: Process, receiver: Process, nodes: Sequence[NodeProcess]) -> None:
+    """Wait until messages reach the nodes and their poses reach the observer."""
+    for topic in (topic for node in nodes for topic in node.topics):
+        receiver('watch', topic)
+    for node in nodes:
+        if not sender('match', node.joint_topic):
+            raise RuntimeError(f'no node has subscribed to {node.joint_topic}')
+        for _ in range(100):
+            sender('send', node.joint_topic, _JOINTS, 100.0, _TRIES)
+            answers = [receiver('take', topic, _TRIES, _SOON) for topic in node.topics]
+            if all(answers):
                 break
-            rate *= _RAMP
         else:
-            report.note(f'none lost up to {rate / _RAMP:.0f} Hz')
-        bench.forget(node)
+            raise RuntimeError(f'nothing from {node.topics}')
+        # What still comes is no answer to what is sent later; one wait takes all in.
+        for i, topic in enumerate(node.topics):
+            receiver('take', topic, sys.maxsize, 0.0 if i else _SOON)
+
+
+def _stretch(sender: Process, receiver: Process, node: NodeProcess, count: int) -> Stretch:
+    """Send messages through a node and return what was seen of them."""
+    before = cpu_ns(node.pid)
+    sent = sender('send', node.joint_topic, _JOINTS, _RATE, count)
+    received = [receiver('take', topic, count, _QUIET) for topic in node.topics]
+    cpu = (cpu_ns(node.pid) - before) / 1000 / count
+    # Messages and poses are paired by their order: ready-made poses carry no stamp of theirs.
+    return Stretch(cpu, [(arrived - at) / 1000 for arrivals in received
+                         for at, arrived in zip(sent, arrivals, strict=True)])

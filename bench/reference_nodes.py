@@ -9,43 +9,38 @@ from __future__ import annotations
 import signal
 import sys
 from threading import Event
-from typing import Any
 
 from geometry_msgs.msg import PoseStamped
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
-DEPTH = 1000  # messages; every node has it in and out, so that a stall of the machine loses none
-QOS = QoSProfile(depth=DEPTH)
-STOP = Event()
-TIPS = ('left_foot', 'right_foot')
+QOS = QoSProfile(depth=1000)  # so that a stall of the machine loses no message
 
 
-def floor(node: Node) -> None:
+def floor(node: Node, publishers: list[Publisher]) -> None:
     """Receive bytes, send two ready-made byte strings."""
-    left, right = _publishers(node)
-    ready = _ready_made()
+    pose = PoseStamped()
+    pose.header.frame_id = 'root_link'
+    ready = bytes(serialize_message(pose))
+    left, right = publishers
 
     def relay(data: bytes) -> None:
         left.publish(ready)
         right.publish(ready)
     node.create_subscription(JointState, 'joint_states', relay, QOS, raw=True)
-    executor = EventsExecutor()
-    executor.add_node(node)
-    while not STOP.is_set():
-        executor.spin_once(timeout_sec=0.25)
 
 
-def plain(node: Node) -> None:
+def plain(node: Node, publishers: list[Publisher]) -> None:
     """Compute with numpy, 4x4 matrix by 4x4 matrix."""
     from bench.plain import chains, foot_matrix, quaternion
-    legs, publishers = chains(), _publishers(node)
+    legs = chains()
 
     def publish_poses(message: JointState) -> None:
         positions = dict(zip(message.name, message.position))
@@ -59,34 +54,21 @@ def plain(node: Node) -> None:
              pose.pose.orientation.w) = quaternion(T)
             publisher.publish(pose)
     node.create_subscription(JointState, 'joint_states', publish_poses, QOS)
-    _spin_plain(node)
-
-
-def _publishers(node: Node) -> list[Any]:
-    return [node.create_publisher(PoseStamped, f'~/{tip}/pose', QOS) for tip in TIPS]
-
-
-def _ready_made() -> bytes:
-    pose = PoseStamped()
-    pose.header.frame_id = 'root_link'
-    return bytes(serialize_message(pose))
-
-
-def _spin_plain(node: Node) -> None:
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    while not STOP.is_set():
-        executor.spin_once(timeout_sec=0.25)
-
-
-NODES = {node.__name__: node for node in (plain, floor)}
 
 
 def main() -> None:
     """Run the node that the first argument names until SIGTERM."""
-    signal.signal(signal.SIGTERM, lambda number, frame: STOP.set())
+    stop = Event()
+    signal.signal(signal.SIGTERM, lambda number, frame: stop.set())
     rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
-    NODES[sys.argv[1]](Node('foot_pose_publisher'))
+    node = Node('foot_pose_publisher')
+    set_up, executor = {'floor': (floor, EventsExecutor()),
+                        'plain': (plain, SingleThreadedExecutor())}[sys.argv[1]]
+    set_up(node, [node.create_publisher(PoseStamped, f'~/{tip}/pose', QOS)
+                  for tip in ('left_foot', 'right_foot')])
+    executor.add_node(node)
+    while not stop.is_set():
+        executor.spin_once(timeout_sec=0.25)
     rclpy.shutdown()  # a node that does not say goodbye slows the discovery of the next one down
 
 

@@ -79,11 +79,8 @@ def percentile(values: Sequence[float], percent: float) -> float:
 
 
 def cpu_ns(pid: int) -> int:
-    """Return the CPU time that all threads of a process have used [ns].
-
-    Linux builds the clock's id from the process id as clock_getcpuclockid(3) does.
-    """
-    return time.clock_gettime_ns((~pid << 3) | 2)
+    """Return the CPU time that all threads of a process have used [ns]."""
+    return time.clock_gettime_ns((~pid << 3) | 2)  # as clock_getcpuclockid(3) builds the id
 
 
 def resident_bytes(pid: int, key: str = 'VmRSS:') -> int:

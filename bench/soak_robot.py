@@ -40,38 +40,20 @@ _BOTH, _LEFT, _RIGHT, _NONE = (True, True), (True, False), (False, True), (False
 
 
 class Promise(NamedTuple):
-    """A pose that the rules of the input promise.
+    """A pose that the rules of the input promise."""
 
-    Attributes:
-        stamp: its stamp [ns].
-        certain: False while it is open whether the message has reached the node at all.
-        sent: when its message was sent [ns].
-        sample: which sample of the gait it shows.
-        fault: what was being done to the node then.
-    """
-
-    stamp: int
-    certain: bool
-    sent: int
-    sample: int
-    fault: str
+    stamp: int  # ns
+    certain: bool  # that the message reaches the node at all
+    sent: int  # ns
+    sample: int  # of the gait
+    fault: str  # what was being done to the node then
 
 
 class SoakRobot:
     """Sends joint states, knows what poses they promise, and takes in what comes.
 
-    Args:
-        namespace: namespace of the node under test.
-
-    Attributes:
-        latencies: of every tenth pose since they were last taken [us].
-        sent: messages sent.
-        kept: poses that arrived as promised.
-        lost: promised poses that were passed over.
-        unexpected: poses that nothing had promised.
-        twists: twists received.
-        faults: how often each fault was done.
-        complaints: what was not as it has to be, in words.
+    It counts the promised poses that were `kept` and `lost`, those `unexpected`, the `twists` and
+    the `faults` done; `latencies` [us] has every tenth, `complaints` says what is not as it must.
     """
 
     def __init__(self, namespace: str) -> None:
@@ -105,7 +87,7 @@ class SoakRobot:
                 PoseStamped, f'foot_pose_publisher/{foot}/pose', self._receiver(foot), self._qos,
                 raw=True)
             self._node.create_subscription(
-                TwistStamped, f'foot_pose_publisher/{foot}/twist', self._receive_twist, 10,
+                TwistStamped, f'foot_pose_publisher/{foot}/twist', self._count_twist, 10,
                 raw=True)
 
     @property
@@ -180,13 +162,13 @@ class SoakRobot:
             self._certain = self._certain or min(self._kept.values()) > self._answered_from
         return receive
 
+    def _count_twist(self, data: bytes) -> None:
+        self.twists += 1
+
     def _miss(self, foot: str, promise: Promise) -> None:
         if promise.certain:
             self.lost += 1
             self.complaints.append(f'{foot}: lost pose at {promise.stamp} during {promise.fault}')
-
-    def _receive_twist(self, data: bytes) -> None:
-        self.twists += 1
 
     def _check(self, foot: str, promise: Promise, data: bytes) -> None:
         """Check that a pose is that of some configuration that has been set."""

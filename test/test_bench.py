@@ -47,8 +47,9 @@ def test_a_missed_promise_is_named_with_its_figure(capsys):
 
 def test_only_with_check_a_missed_promise_is_exit_status_1(monkeypatch):
     from bench import __main__ as bench_main
-    monkeypatch.setattr(bench_main, '_measure', lambda part, report, quick: report.row(
-        part, [2.0], 'x', at_most=1.0))
+    from bench import kinematics_bench
+    monkeypatch.setattr(kinematics_bench, 'measure_start', lambda report, quick: report.row(
+        'start', [2.0], 'x', at_most=1.0))
     for words, status in ((['start'], 0), (['start', '--check'], 1)):
         monkeypatch.setattr(sys, 'argv', ['bench', *words])
         assert bench_main.main() == status
