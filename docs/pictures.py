@@ -5,7 +5,7 @@ import sys
 
 from icub_leg_fk.kinematics import Catalog
 from icub_leg_fk.tools.drawing import color_of, FAINT, feet_figure, save_picture, Space
-from icub_leg_fk.tools.gait import PERIOD, walk
+from icub_leg_fk.tools.gait import walk
 from icub_leg_fk.tools.plot import default_instants
 import numpy as np
 
@@ -19,8 +19,7 @@ SOLES = {name: CATALOG.chain(name, VERSION, 'sole') for name in LEGS}
 def walking():
     """Return the feet of the synthetic gait over time."""
     tracks = [walk(CATALOG, VERSION, 5.0).track(SOLES[name]) for name in LEGS]
-    instants = [PERIOD + instant for instant in default_instants(tracks)]
-    return feet_figure(tracks, instants, f'synthetic gait   {VERSION}', SOLES)
+    return feet_figure(tracks, default_instants(tracks), f'synthetic gait   {VERSION}', SOLES)
 
 
 def frames():
