@@ -420,6 +420,13 @@ def test_damage_and_missing_parts_end_in_one_line_with_what_mends_them(tmp_path)
             refused(tmp_path, file, mend)
         file.unlink()
         refused(tmp_path, source, 'missing')
+    source = write_bag(tmp_path / 'odd', joints=walk(5))
+    good = (source / 'metadata.yaml').read_text()
+    for field, text in (('message_count: 5', 'message_count: five'),
+                        ('custom_data:', 'custom_data: text\n  more:')):
+        assert field in good
+        (source / 'metadata.yaml').write_text(good.replace(field, text))
+        refused(tmp_path, source, 'metadata.yaml has values of the wrong type')
     (tmp_path / 'empty').mkdir()
     refused(tmp_path, tmp_path / 'empty', 'it is not a rosbag2 recording')
     refused(tmp_path, tmp_path / 'nothing', 'there is no such file or directory')

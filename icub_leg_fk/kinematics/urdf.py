@@ -418,7 +418,7 @@ def _joint(element: ET.Element, fail: Callable[[str], NoReturn]) -> UrdfJoint:
         if len(values) != count or not all(map(math.isfinite, values)):
             fail(f'joint {name!r}: {tag} {key} is {text[:60]!r}; allowed: {count} finite '
                  f'number{"s" * (count > 1)}')
-        if tag == 'origin' and max(map(abs, values)) > _LARGEST:
+        if tag in ('origin', 'axis') and max(map(abs, values)) > _LARGEST:
             fail(f'joint {name!r}: {tag} {key} is {text[:60]!r}; allowed: up to {_LARGEST:g}')
         return values
 

@@ -61,6 +61,9 @@ def open_bag(path: str | Path) -> Iterator[Any]:
             if odd:
                 raise InputFileError(f'{shown}: the messages of {", ".join(odd)} are not CDR; '
                                      'allowed: recordings of ROS 2, which are')
+            if not isinstance(reader.storage.metadata.custom or {}, dict) or not all(
+                    isinstance(connection.msgcount, int) for connection in reader.connections):
+                raise unreadable(path, ValueError(f'{METADATA} has values of the wrong type'))
             yield reader
         finally:
             reader.close()
