@@ -24,7 +24,7 @@ MODULES = {
     'list': 'list_chains',
     'pose': 'pose',
     'explain': 'explain',
-    'bag': 'bag',
+    'bag': 'bag_command',
     'plot': 'plot',
     'table': 'table',
     'compare': 'compare',

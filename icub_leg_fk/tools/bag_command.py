@@ -1,0 +1,214 @@
+"""`leg_fk bag`: adds the poses of the feet to recordings, several at a time."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterator, Mapping, Sequence
+import os
+from pathlib import Path
+import sys
+from typing import Any
+
+from icub_leg_fk.errors import LegFKError, OutputFileError
+from icub_leg_fk.tools.bag import add_foot_poses, STORAGES, Summary
+from icub_leg_fk.tools.chain_arguments import (
+    add_chain_version,
+    add_kinematics_file,
+    DEFAULT_VERSION,
+    own_versions,
+)
+
+HELP = 'copy a bag and add the poses of the feet, as the node would have published them'
+EXAMPLES = """\
+Reads rosbag2 bags by rosbags: mcap and sqlite3, split and compressed ones too, directories or
+single files. Copies every topic as it is and adds /foot_pose_publisher/<tip>/pose behind each
+message of joint states, by the node's own rules and byte for byte what the node would send; a
+message with a zero stamp is stamped with the time it was recorded at. OUT is a directory, or a
+single file if it ends in .mcap or .db3. It appears when it is complete.
+
+examples:
+  leg_fk bag walking walking_with_poses
+  leg_fk bag walking.mcap walking_with_poses.mcap --version v1 --foot-frame sole
+  leg_fk bag walking poses --only-poses --twist --tf --storage mcap
+  leg_fk bag head head_poses --chains head_imu --version v2
+  leg_fk bag walking all_poses --chains left_leg head_imu --chain-version head_imu=v2
+  leg_fk bag monday/* --out-dir with_poses --jobs 4"""
+
+_AS_THEY_ARE = ('chains', 'version', 'kinematics_file', 'foot_frame', 'frame_prefix',
+                'joint_timeout', 'joint_topic', 'twist', 'tf', 'only_poses', 'replace_poses',
+                'storage', 'force')
+"""Options of the command that `add_foot_poses` has by the same name."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.usage = ('leg_fk bag IN OUT [options]\n'
+                    '       leg_fk bag IN... --out-dir DIR [--jobs N] [options]')
+    parser.add_argument('bags', metavar='BAG', nargs='+', help='the bag to read and the bag to '
+                        'make; with --out-dir, all are bags to read')
+    parser.add_argument('--out-dir', metavar='DIR', help='make a bag of the same name in DIR of '
+                        'every bag')
+    parser.add_argument('--jobs', metavar='N', type=_positive_integer, default=1,
+                        help='bags to work on at a time (default: 1)')
+    parser.add_argument('--force', action='store_true',
+                        help='replace an existing output bag, once the new one is complete')
+    parser.add_argument('--joint-topic', metavar='TOPIC', help='topic of the joint states '
+                        '(default: /joint_states, or the only one there is)')
+    parser.add_argument('--chains', metavar='CHAIN', nargs='+', default=['left_leg', 'right_leg'],
+                        help='chains to add (default: left_leg right_leg)')
+    parser.add_argument('--version', metavar='VERSION', default=DEFAULT_VERSION,
+                        help=f'version of the chains (default: {DEFAULT_VERSION})')
+    add_chain_version(parser)
+    parser.add_argument('--foot-frame', metavar='FRAME', default='dh', help='axes of the feet: '
+                        "dh, the table's last frame (the default), sole, or another of your file")
+    parser.add_argument('--frame-prefix', metavar='PREFIX', default='',
+                        help='put before every frame id')
+    parser.add_argument('--joint-timeout', metavar='S', type=float, default=0.5,
+                        help='age of a joint beside the newest of its chain above which there is '
+                             'no pose; 0 turns this off (default: 0.5)')
+    parser.add_argument('--twist', action='store_true',
+                        help='also add the velocities of the tips, from the joint velocities')
+    parser.add_argument('--tf', action='store_true', help='also add the poses to /tf')
+    parser.add_argument('--only-poses', action='store_true',
+                        help='leave out everything but what is added')
+    parser.add_argument('--replace-poses', action='store_true',
+                        help='leave out the poses that the bag has already')
+    parser.add_argument('--storage', metavar='{mcap,sqlite3}', choices=('mcap', 'sqlite3'),
+                        default='',
+                        help='storage of the new bag (default: as OUT says, or as in the old one)')
+    add_kinematics_file(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Convert the bags."""
+    from icub_leg_fk.tools.signals import stop_on_signals
+
+    tasks = _tasks(args)
+    options = {name: getattr(args, name) for name in _AS_THEY_ARE}
+    options['chain_versions'] = own_versions(args, args.chains)
+    with stop_on_signals():
+        if len(tasks) == 1:
+            with _progress() as progress:
+                summary = add_foot_poses(*tasks[0], **options, progress=progress)
+            print('\n'.join(_summary_lines(summary)))
+            return 0
+        failed = False
+        for (source, _), outcome in _outcomes(tasks, options, args.jobs):
+            if isinstance(outcome, Summary):
+                print('\n'.join(_summary_lines(outcome)), flush=True)
+            else:
+                failed = True
+                line = ' '.join(str(outcome).split())
+                named = line if line.startswith(str(source)) else f'{source}: {line}'
+                print(f'leg_fk: error: {named}', file=sys.stderr, flush=True)
+        return 2 if failed else 0
+
+
+def _outcomes(tasks: Sequence[tuple[Path, Path]], options: Mapping[str, Any], jobs: int
+              ) -> Iterator[tuple[tuple[Path, Path], Summary | Exception]]:
+    """Yield each task with what came of it, some worked on at a time."""
+    if jobs == 1:
+        for task in tasks:
+            try:
+                yield task, add_foot_poses(*task, **options)
+            except LegFKError as error:
+                yield task, error
+        return
+    from concurrent.futures import as_completed, ProcessPoolExecutor
+    from concurrent.futures.process import BrokenProcessPool
+    from multiprocessing import active_children, get_context
+
+    pool = ProcessPoolExecutor(min(jobs, len(tasks)), get_context('spawn'), _begin_worker)
+    try:
+        futures = {pool.submit(add_foot_poses, *task, **options): task for task in tasks}
+        for future in as_completed(futures):
+            try:
+                yield futures[future], future.result()
+            except BrokenProcessPool:
+                yield futures[future], LegFKError('not done: a worker was killed')
+            except LegFKError as error:
+                yield futures[future], error
+        pool.shutdown()
+    except BaseException:
+        for worker in active_children():
+            worker.terminate()
+        pool.shutdown(cancel_futures=True)
+        raise
+
+
+def _begin_worker() -> None:
+    """Let a worker that is told to stop take back what it has begun."""
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the command tells its workers itself
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))
+
+
+def _tasks(args: argparse.Namespace) -> list[tuple[Path, Path]]:
+    """Return which bag is to become which."""
+    if args.out_dir is None:
+        if len(args.bags) != 2:
+            count = f'{len(args.bags)} bag{"s" * (len(args.bags) != 1)}'
+            raise LegFKError(f'{count} without --out-dir; allowed: two, IN and OUT')
+        source, target = args.bags
+        return [(Path(source), Path(target))]
+    out_dir = Path(args.out_dir)
+    try:
+        out_dir.mkdir(exist_ok=True)
+    except OSError as error:
+        raise OutputFileError(f'--out-dir {out_dir}: {error.strerror}') from error
+    tasks = [(Path(bag), out_dir / _name(Path(bag), args.storage)) for bag in args.bags]
+    targets = [target for _, target in tasks]
+    for target in targets:
+        if targets.count(target) > 1:
+            raise OutputFileError(f'{target}: several bags would get this name; allowed: one')
+    return tasks
+
+
+def _name(bag: Path, storage: str | None) -> str:
+    """Return the name of the new bag: that of the old one, with the ending of its storage."""
+    stem, ending = os.path.splitext(os.path.basename(os.path.abspath(bag)))
+    if storage and ending in STORAGES:
+        return stem + next(ending for ending, name in STORAGES.items() if name == storage)
+    return stem + ending
+
+
+def _positive_integer(text: str) -> int:
+    if not text.strip().isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f'found {text.strip()!r}, allowed: integers from 1 on')
+    return int(text)
+
+
+class _progress:
+    """Shows the share that is done on stderr, if that is a terminal."""
+
+    def __enter__(self) -> Callable[[float], None] | None:
+        self._visible = sys.stderr is not None and sys.stderr.isatty()
+        return self._show if self._visible else None
+
+    def _show(self, share: float) -> None:
+        print(f'\r{100 * min(share, 1.0):3.0f} % \033[K', end='', file=sys.stderr, flush=True)
+
+    def __exit__(self, *_: object) -> None:
+        if self._visible:
+            print('\r\033[K', end='', file=sys.stderr, flush=True)
+
+
+def _summary_lines(summary: Summary) -> list[str]:
+    """Return the closing summary, line by line."""
+    from icub_leg_fk.tools.text import columns, indented
+
+    rows = [(str(summary.copied), 'messages copied')]
+    rows += [(str(count), f'added on {topic}') for topic, count in summary.added.items()]
+    rows += [(str(count), 'time steps back: held joints forgotten' if reason == 'time_jump'
+              else f'joint states rejected: {reason}')
+             for reason, count in summary.rejected.items()]
+    rows += [(str(count), f'joint states gave no {"twist" if reason == "no_velocity" else "pose"} '
+              f'of {chain}: {reason} ({joints})')
+             for chain, reasons in summary.held_back.items()
+             for reason, (count, joints) in reasons.items()]
+    lines = [f'{summary.source} -> {summary.target}', *indented(columns(rows))]
+    lines += indented([f'note: {note}' for note in summary.notes])
+    speed = summary.recorded / max(summary.took, 1e-9)
+    return [*lines, f'  {summary.recorded:.3f} s of recording in {summary.took:.3f} s, '
+            f'{speed:.1f} seconds of recording per second']
