@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from icub_leg_fk.errors import InputFileError
 from icub_leg_fk.kinematics import Catalog, chain_from_urdf, Urdf
-from icub_leg_fk.kinematics.urdf import almost_parallel
+from icub_leg_fk.kinematics.table_from_urdf import almost_parallel
 from icub_leg_fk.tools.leg_fk import main
 from leg_fk_process import assert_one_line_complaint, leg_fk
 import numpy as np

@@ -13,7 +13,8 @@ from icub_leg_fk.kinematics.link import DHLink
 from icub_leg_fk.kinematics.rotation import matrix_to_quaternion, quaternion_to_matrix
 
 if TYPE_CHECKING:
-    from icub_leg_fk.kinematics.urdf import chain_from_urdf, Urdf
+    from icub_leg_fk.kinematics.table_from_urdf import chain_from_urdf
+    from icub_leg_fk.kinematics.urdf import Urdf
 
 __all__ = [
     'Catalog', 'Chain', 'DHLink', 'Urdf', 'chain_from_urdf', 'config_file', 'load_chain',
@@ -23,6 +24,7 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Import what reads URDFs only when it is needed."""
-    if name in ('chain_from_urdf', 'Urdf'):
-        return getattr(import_module('icub_leg_fk.kinematics.urdf'), name)
+    modules = {'chain_from_urdf': 'table_from_urdf', 'Urdf': 'urdf'}
+    if name in modules:
+        return getattr(import_module(f'icub_leg_fk.kinematics.{modules[name]}'), name)
     raise AttributeError(f'module {__name__!r} has no attribute {name!r}')

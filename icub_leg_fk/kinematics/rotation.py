@@ -130,8 +130,8 @@ def turns_about(axis: Array, angle: ArrayLike) -> Array:
     """Return the (..., 3, 3) rotations by (...) angles [rad] about a unit vector (Rodrigues)."""
     x, y, z = axis
     K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    angle = np.asarray(angle, dtype=float)[..., None, None]
-    return np.asarray(np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K))
+    cos, sin = cos_sin(np.asarray(angle, dtype=float)[..., None, None])
+    return np.asarray(np.eye(3) + sin * K + (1 - cos) * (K @ K))
 
 
 def angle_between(one: Array, two: Array) -> Array:

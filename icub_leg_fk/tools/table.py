@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the kinematics file."""
     from icub_leg_fk.kinematics import Catalog, chain_from_urdf, Urdf
-    from icub_leg_fk.kinematics.urdf import almost_parallel
+    from icub_leg_fk.kinematics.table_from_urdf import almost_parallel
     from icub_leg_fk.tools.output_file import check_target, write_text
 
     if args.output:
