@@ -144,6 +144,7 @@ def test_alone_it_lists_its_commands():
     (['plot', 'x.csv', '--ouput', 'y'], 'unknown option --ouput; did you mean --output?'),
     (['demo', '--colour'], 'unknown option --colour (see'),
     (['pose', 'left_leg', '--frame', 'sole'], 'did you mean --foot-frame?'),
+    (['pose', 'left_leg', '--degrees', '1_0'], "found '1_0'"),
     (['lsit'], "unknown command 'lsit'; did you mean 'list'?"),
     (['pose', 'left_leg', '-k', '', '--degrees', '0'], 'a readable YAML file'),
     (['pose', 'left_leg', '--version', '', '--degrees', '0'],

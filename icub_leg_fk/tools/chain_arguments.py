@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import math
 import sys
 from typing import TYPE_CHECKING
@@ -101,11 +101,27 @@ def add_joint_positions(parser: argparse.ArgumentParser, *, required: bool) -> N
             help=f'joint positions in {unit}, root to tip; of a prismatic joint always in metres')
 
 
-def _finite_number(text: str) -> float:
+def number(text: str) -> float:
+    """Return the number that a text is; NaN if it is none."""
     try:
-        value = float(text)
+        return float(text) if text.isascii() and '_' not in text else math.nan
     except ValueError:
-        value = math.nan
+        return math.nan
+
+
+def number_between(low: float, high: float, unit: str = '') -> Callable[[str], float]:
+    """Return what reads an option that is a number from one to another, both included."""
+    def parse(text: str) -> float:
+        value = number(text)
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(
+                f'found {text.strip()!r}, allowed: {low:g} to {high:g}{unit}')
+        return value
+    return parse
+
+
+def _finite_number(text: str) -> float:
+    value = number(text)
     if not abs(value) <= LARGEST:
         raise argparse.ArgumentTypeError(f'found {text.strip()!r}, allowed: finite numbers up to '
                                          f'{LARGEST:g}, one per joint')

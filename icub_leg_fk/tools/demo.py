@@ -10,10 +10,10 @@ import sys
 from typing import Any, TYPE_CHECKING
 
 from icub_leg_fk.errors import LegFKError, MissingDependencyError
-from icub_leg_fk.tools.chain_arguments import DEFAULT_VERSION
+from icub_leg_fk.tools.chain_arguments import DEFAULT_VERSION, number_between
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from icub_leg_fk.kinematics import Catalog, Chain
     from icub_leg_fk.tools.demo_replay import Answers, Replay
@@ -50,9 +50,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help=f'version of both legs (default: {DEFAULT_VERSION})')
     parser.add_argument('--foot-frame', metavar='{dh,sole}', default='dh',
                         help="axes of the feet: the table's last frame (the default), or the sole")
-    parser.add_argument('--seconds', metavar='S', type=_number(0.1, 3600),
+    parser.add_argument('--seconds', metavar='S', type=number_between(0.1, 3600),
                         help='how long to play (default: 10, or the whole recording)')
-    parser.add_argument('--rate', metavar='HZ', type=_number(1, 1000),
+    parser.add_argument('--rate', metavar='HZ', type=number_between(1, 1000),
                         help='messages per second of the gait (default: 100)')
     parser.add_argument('-o', '--output', metavar='FILE', type=Path,
                         help='picture to write, .png, .svg or .pdf (default: demo.png, which is '
@@ -286,16 +286,3 @@ def _words(name: str) -> str:
 
 def _namespace() -> str:
     return f'/leg_fk_demo_{os.getpid()}'
-
-
-def _number(low: float, high: float) -> Callable[[str], float]:
-    def parse(text: str) -> float:
-        try:
-            value = float(text)
-        except ValueError:
-            value = float('nan')
-        if not low <= value <= high:
-            raise argparse.ArgumentTypeError(
-                f'found {text.strip()!r}, allowed: {low:g} to {high:g}')
-        return value
-    return parse

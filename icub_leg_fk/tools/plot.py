@@ -16,6 +16,7 @@ from icub_leg_fk.tools.chain_arguments import (
     add_kinematics_file,
     chosen_version,
     load_catalog,
+    number,
     own_versions,
 )
 
@@ -201,10 +202,7 @@ def _time(text: str) -> float:
 
 
 def _times(text: str) -> list[float]:
-    try:
-        times = [float(word) for word in text.split(',')]
-    except ValueError:
-        times = []
+    times = [number(word) for word in text.split(',')]
     if not 0 < len(times) <= MAX_INSTANTS or not all(map(math.isfinite, times)):
         raise argparse.ArgumentTypeError(
             f'found {text.strip()!r}, allowed: up to {MAX_INSTANTS} times in seconds, '

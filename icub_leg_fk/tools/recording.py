@@ -9,12 +9,13 @@ from dataclasses import dataclass, field
 from functools import cached_property
 import math
 from pathlib import Path
+import sys
 from typing import Any
 
 from icub_leg_fk.errors import InputFileError
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
-from icub_leg_fk.tools.chain_arguments import LARGEST
+from icub_leg_fk.tools.chain_arguments import LARGEST, number
 import numpy as np
 
 TIMES = ('time', 'Time', 'timestamp')
@@ -185,11 +186,11 @@ def _rows(file: str, reader: Any, joints: Sequence[str]) -> Iterator[list[float]
                                  f'{len(header)} columns; allowed: one value per column')
         numbers = []
         for name, place in zip(columns, places, strict=True):
-            number = _number(row[place])
-            if math.isnan(number) or (name != time and abs(number) > LARGEST):
+            value = number(row[place])
+            if not abs(value) <= (sys.float_info.max if name == time else LARGEST):
                 raise InputFileError(f'{file}:{reader.line_num}: column {name}: {row[place]!r}; '
                                      f'allowed: a finite number up to {LARGEST:g}')
-            numbers.append(number)
+            numbers.append(value)
         if numbers[0] < before:
             raise InputFileError(f'{file}:{reader.line_num}: column {time}: {numbers[0]} after '
                                  f'{before}; allowed: times that do not decrease')
@@ -197,12 +198,3 @@ def _rows(file: str, reader: Any, joints: Sequence[str]) -> Iterator[list[float]
         yield numbers
     if before == -math.inf:
         raise InputFileError(f'{file}: no rows; allowed: at least one after the header')
-
-
-def _number(text: str) -> float:
-    """Return a finite number, or NaN if the text is none."""
-    try:
-        number = float(text)
-    except ValueError:
-        return math.nan
-    return number if math.isfinite(number) else math.nan

@@ -11,6 +11,7 @@ import tempfile
 from typing import TYPE_CHECKING
 
 from icub_leg_fk.errors import LegFKError
+from icub_leg_fk.tools.chain_arguments import number_between
 
 if TYPE_CHECKING:
     from icub_leg_fk.kinematics import Chain, DHLink, Urdf
@@ -44,7 +45,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--convention', metavar='{standard,modified}', default='standard',
                         choices=('standard', 'modified'),
                         help="of the table: standard (the default), or modified, which is Craig's")
-    parser.add_argument('--tolerance', metavar='RAD', type=_tolerance, default=1e-4,
+    parser.add_argument('--tolerance', metavar='RAD', type=number_between(0, 0.1, ' rad'),
+                        default=1e-4,
                         help='angle between axes up to which they are taken as parallel, since '
                              'URDFs are rounded (default: 1e-4); what it cost is said')
     parser.add_argument('-o', '--output', metavar='FILE',
@@ -184,13 +186,3 @@ def _word(name: str) -> str:
 
 def _comment(text: str) -> str:
     return re.sub(r'[^ -!#-\[\]-~]', '_', text)[:200]
-
-
-def _tolerance(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.0 <= value <= 0.1:
-        raise argparse.ArgumentTypeError(f'found {text.strip()!r}, allowed: 0 to 0.1 rad')
-    return value
