@@ -3,10 +3,10 @@
 from pathlib import Path
 import sys
 
-from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.kinematics import Catalog, config_file
 from icub_leg_fk.tools.drawing import color_of, FAINT, feet_figure, save_picture, Space
-from icub_leg_fk.tools.gait import walk
 from icub_leg_fk.tools.plot import default_instants
+from icub_leg_fk.tools.recording import read_csv
 import numpy as np
 
 VERSION = 'v2_5'
@@ -18,7 +18,9 @@ SOLES = {name: CATALOG.chain(name, VERSION, 'sole') for name in LEGS}
 
 def walking():
     """Return the feet of the synthetic gait over time."""
-    tracks = [walk(CATALOG, VERSION, 5.0).track(SOLES[name]) for name in LEGS]
+    gait = read_csv(config_file('examples/synthetic_walk.csv'),
+                    [joint for sole in SOLES.values() for joint in sole.joint_names])
+    tracks = [gait.track(SOLES[name]) for name in LEGS]
     return feet_figure(tracks, default_instants(tracks), f'synthetic gait   {VERSION}', SOLES)
 
 

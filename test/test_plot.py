@@ -7,8 +7,8 @@ import sys
 from xml.etree import ElementTree
 import zlib
 
+from gait import walk
 from icub_leg_fk.kinematics import Catalog
-from icub_leg_fk.tools.gait import walk
 from icub_leg_fk.tools.leg_fk import main
 from icub_leg_fk.tools.plot import default_instants
 from icub_leg_fk.tools.recording import ChainTrack

@@ -9,7 +9,7 @@ import shutil
 import sys
 from typing import Any, TYPE_CHECKING
 
-from icub_leg_fk.errors import LegFKError, MissingDependencyError
+from icub_leg_fk.errors import MissingDependencyError
 from icub_leg_fk.tools.chain_arguments import DEFAULT_VERSION, number_between
 
 if TYPE_CHECKING:
@@ -51,9 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--foot-frame', metavar='{dh,sole}', default='dh',
                         help="axes of the feet: the table's last frame (the default), or the sole")
     parser.add_argument('--seconds', metavar='S', type=number_between(0.1, 3600),
-                        help='how long to play (default: 10, or the whole recording)')
-    parser.add_argument('--rate', metavar='HZ', type=number_between(1, 1000),
-                        help='messages per second of the gait (default: 100)')
+                        help='how long to play (default: the whole recording)')
     parser.add_argument('-o', '--output', metavar='FILE', type=Path,
                         help='picture to write, .png, .svg or .pdf (default: demo.png, which is '
                              'replaced)')
@@ -78,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
         check_target(args.save, force=args.force, may_replace=is_bag)
     catalog = Catalog.load()
     chains = [catalog.chain(name, args.version, args.foot_frame) for name in CHAINS]
-    recording = _recording(args, catalog, chains)
+    recording = _recording(args, chains)
     domain = stay_on_this_machine()
     print(f'iCub legs {args.version}: {len(recording.times)} JointState messages to '
           f'foot_pose_publisher, poses back over DDS\n'
@@ -100,16 +98,12 @@ def run(args: argparse.Namespace) -> int:
     return status
 
 
-def _recording(args: argparse.Namespace, catalog: Catalog, chains: Sequence[Chain]
-               ) -> JointRecording:
-    from icub_leg_fk.tools.gait import walk
+def _recording(args: argparse.Namespace, chains: Sequence[Chain]) -> JointRecording:
+    from icub_leg_fk.kinematics import config_file
     from icub_leg_fk.tools.recording import read_csv
 
-    if args.recording is None:
-        return walk(catalog, args.version, args.seconds or 10.0, args.rate or 100.0)
-    if args.rate is not None:
-        raise LegFKError('--rate: found with --recording, which is played in its own timing')
-    recording = read_csv(args.recording, [name for chain in chains for name in chain.joint_names])
+    file = args.recording or config_file('examples/synthetic_walk.csv')
+    recording = read_csv(file, [name for chain in chains for name in chain.joint_names])
     return recording if args.seconds is None else recording.first(args.seconds)
 
 
@@ -165,7 +159,6 @@ def _save(path: Path, force: bool, recording: JointRecording, stamps: Sequence[i
         'sensor_msgs/msg/JointState', 'std_msgs/msg/Header', 'builtin_interfaces/msg/Time')]
     joint_state, header, time = kinds
     nothing = np.zeros(0)
-    velocities = recording.velocities
     with whole_path(path, force=force, may_replace=is_bag) as place, \
             rosbag2.Writer(place, version=rosbag2.Writer.VERSION_LATEST,
                            storage_plugin=rosbag2.StoragePlugin.MCAP) as writer:
@@ -173,7 +166,7 @@ def _save(path: Path, force: bool, recording: JointRecording, stamps: Sequence[i
         for i, stamp in enumerate(stamps):
             message = joint_state(
                 header(time(*divmod(stamp, 1_000_000_000)), ''), list(recording.joint_names),
-                recording.positions[i], nothing if velocities is None else velocities[i], nothing)
+                recording.positions[i], nothing, nothing)
             writer.write(topic, stamp, store.serialize_cdr(message, joint_state.__msgtype__))
 
 

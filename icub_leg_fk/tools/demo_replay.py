@@ -229,13 +229,10 @@ class Replay:
             answers.newest = index
 
     def _publish(self, stamp: int, index: int) -> None:
-        row = max(index, 0)
         message = self._joint_state()
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
         message.name = list(self._recording.joint_names)
-        message.position = self._recording.positions[row].tolist()
-        if self._recording.velocities is not None:
-            message.velocity = self._recording.velocities[row].tolist()
+        message.position = self._recording.positions[max(index, 0)].tolist()
         self._sent[stamp] = index, time.monotonic()
         with held_signals():
             self._publisher.publish(message)

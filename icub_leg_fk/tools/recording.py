@@ -1,4 +1,4 @@
-"""Joint recordings: what joints did over time, from a bag, a CSV file or made."""
+"""Joint recordings: what joints did over time, from a bag or a CSV file."""
 
 from __future__ import annotations
 
@@ -31,19 +31,16 @@ class JointRecording:
         joint_names: n joint names.
         times: (N,) times [s], not decreasing.
         positions: (N, n) joint positions [rad].
-        velocities: (N, n) joint velocities [rad/s], or None if unknown.
     """
 
     joint_names: tuple[str, ...]
     times: Array
     positions: Array
-    velocities: Array | None = None
 
     def first(self, seconds: float) -> JointRecording:
         """Return the part up to a time after the first sample [s]."""
         n = int(np.searchsorted(self.times, self.times[0] + seconds, side='right'))
-        return JointRecording(self.joint_names, self.times[:n], self.positions[:n],
-                              None if self.velocities is None else self.velocities[:n])
+        return JointRecording(self.joint_names, self.times[:n], self.positions[:n])
 
     def track(self, chain: Chain) -> ChainTrack:
         """Return what one chain did; its joints must be in the recording."""

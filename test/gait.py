@@ -1,5 +1,7 @@
 """A walking gait made from scratch: planned soles, joint angles by inverse kinematics.
 
+It made config/examples/synthetic_walk.csv, which the demonstration plays.
+
 The pelvis stays level and moves forward at constant speed, swaying over the standing foot and
 bobbing a little; a foot stands still on the ground or swings to its next place along a
 minimum-jerk curve. Seen from the root, both soles repeat the same cycle, half a period apart.
@@ -32,7 +34,7 @@ _BUMP = 64 * Polynomial([0, 1]) ** 3 * Polynomial([1, -1]) ** 3
 
 def walk(catalog: Catalog, version: str, seconds: float = 10.0,
          rate: float = 100.0) -> JointRecording:
-    """Return positions [rad] and velocities [rad/s] of both legs, walking with level soles.
+    """Return positions [rad] of both legs, walking with level soles.
 
     The gait's period is rounded to whole samples of the rate [Hz].
 
@@ -44,33 +46,30 @@ def walk(catalog: Catalog, version: str, seconds: float = 10.0,
     left_leg = catalog.chain('left_leg', version, 'sole')
     right_leg = catalog.chain('right_leg', version, 'sole')
     standing = left_leg.forward(_posture(left_leg))[:3, 3]
-    left = _leg_cycle(left_leg, standing, phases, samples / rate)
-    right = _leg_cycle(right_leg, standing * (1, -1, 1), phases + 0.5, samples / rate)
+    left = _leg_cycle(left_leg, standing, phases)
+    right = _leg_cycle(right_leg, standing * (1, -1, 1), phases + 0.5)
     count = max(1, round(seconds * rate))
     rows = np.arange(count) % samples
     return JointRecording(
         joint_names=(*left_leg.joint_names, *right_leg.joint_names),
         times=np.arange(count) / rate,
-        positions=np.hstack((left[0], right[0]))[rows],
-        velocities=np.hstack((left[1], right[1]))[rows])
+        positions=np.hstack((left, right))[rows])
 
 
-def _leg_cycle(chain: Chain, standing: Array, phases: Array,
-               period: float) -> tuple[Array, Array]:
-    """Return the (N, 6) joint positions [rad] and velocities [rad/s] of one leg's cycle."""
+def _leg_cycle(chain: Chain, standing: Array, phases: Array) -> Array:
+    """Return the (N, 6) joint positions [rad] of one leg's cycle."""
     q = _posture(chain)
     level = chain.forward(np.zeros(chain.n))[:3, :3]
-    positions, velocities = [], []
-    for p, v in zip(*_sole_path(standing, level[0, 0], phases, period), strict=True):
+    positions = []
+    for p in _sole_path(standing, level[0, 0], phases):
         q = _solve(chain, p, level, q)
         positions.append(q)
-        velocities.append(np.linalg.solve(chain.jacobian(q), np.append(v, np.zeros(3))))
     for sample in positions:
         outside = chain.out_of_range(sample.tolist())
         if outside:
             raise LegFKError(f'the gait leaves the range of {outside[0]} of {chain.name} '
                              f'{chain.version}')
-    return np.array(positions), np.array(velocities)
+    return np.array(positions)
 
 
 def _posture(chain: Chain) -> Array:
@@ -81,8 +80,8 @@ def _posture(chain: Chain) -> Array:
     return np.array([-KNEE / 2, roll, 0.0, KNEE, KNEE / 2, -roll])
 
 
-def _sole_path(standing: Array, ahead: float, phases: Array, period: float) -> tuple[Array, Array]:
-    """Return (N, 3) positions [m] and velocities [m/s] in the root frame at (N,) phases.
+def _sole_path(standing: Array, ahead: float, phases: Array) -> Array:
+    """Return the (N, 3) positions [m] of a sole in the root frame at (N,) phases.
 
     The foot moves around `standing` and stands in phases 0 to STANCE; `ahead` is 1 where x of the
     root frame points forward, -1 where backward.
@@ -90,17 +89,14 @@ def _sole_path(standing: Array, ahead: float, phases: Array, period: float) -> t
     side = np.sign(standing[1])  # -1 left, +1 right
     phase = phases % 1.0
     swing = np.clip((phase - STANCE) / (1 - STANCE), 0.0, 1.0)
-    swing_rate = np.where(phase > STANCE, 1 / (1 - STANCE), 0.0)
     around = 2 * np.pi * (phase - STANCE / 2)  # 0 at mid-stance
 
     # In the world a foot advances by two steps a period, all of it while it swings, and the
     # pelvis by as much, evenly. A pelvis moving one way is a foot moving back.
     x = -ahead * 2 * STEP * (phase - STANCE / 2 - _SWING(swing))
-    dx = -ahead * 2 * STEP * (1 - _SWING.deriv()(swing) * swing_rate)
-    y, dy = -side * SWAY * np.cos(around), side * SWAY * np.sin(around) * 2 * np.pi
+    y = -side * SWAY * np.cos(around)
     z = LIFT * _BUMP(swing) - BOB * np.cos(2 * around)
-    dz = LIFT * _BUMP.deriv()(swing) * swing_rate + BOB * np.sin(2 * around) * 4 * np.pi
-    return standing + np.stack((x, y, z), axis=1), np.stack((dx, dy, dz), axis=1) / period
+    return standing + np.stack((x, y, z), axis=1)
 
 
 def _solve(chain: Chain, position: Array, level: Array, start: Array) -> Array:
