@@ -92,91 +92,57 @@ class Explanation:
         return float(value) if value.is_number else None
 
 
-class Decimals:
-    """The arithmetic in floats."""
+class Algebra:
+    """The arithmetic: in floats, or exact in sympy's expressions.
 
-    def __init__(self) -> None:
-        self.symbols: dict[str, Cell] = {}
-
-    def number(self, value: float) -> Cell:
-        """Return a number as it is computed with."""
-        return value
-
-    def mm(self, metres: float) -> Cell:
-        """Return a length in mm."""
-        return 1000 * metres
-
-    def angle(self, radians: float) -> Cell:
-        """Return an angle."""
-        return radians
-
-    def joint(self, index: int, link: DHLink, q: float | None) -> tuple[Cell, Cell]:
-        """Return theta [rad] and d [mm] of a row."""
-        moved = link.sign * (q or 0.0)
-        slid, turned = (moved, 0.0) if link.is_prismatic else (0.0, moved)
-        return link.offset + turned, 1000 * (link.d + slid)
-
-    def cos_sin(self, index: int, theta: Cell) -> tuple[Cell, Cell]:
-        """Return cosine and sine of a row's theta."""
-        return cos_sin(theta)
-
-    def cos_sin_constant(self, angle: Cell) -> tuple[Cell, Cell]:
-        """Return cosine and sine of an angle that is no joint's."""
-        return cos_sin(angle)
-
-    def running_products(self, steps: Sequence[Step], modified: bool) -> list[Matrix]:
-        """Return T_01, T_02, ... T_0m."""
-        products = [steps[0].A]
-        for step in steps[1:]:
-            products.append(product(products[-1], step.A))
-        return products
-
-
-class Exact(Decimals):
-    """The arithmetic in sympy's expressions; keeps the meaning of every symbol in `symbols`.
-
-    Cosines and sines of a number are exact as long as they are as simple as sqrt(3)/2; the cosine
-    of 100 degrees stays c_i, since its powers would fill pages.
+    Where it is exact, `symbols` keeps the meaning of every symbol, and cosines and sines of a
+    number are exact as long as they are as simple as sqrt(3)/2; the cosine of 100 degrees stays
+    c_i, since its powers would fill pages.
     """
 
-    def __init__(self) -> None:
-        try:
-            import sympy
-        except ImportError as error:
-            raise MissingDependencyError(
-                'sympy is not installed: exact and symbolic answers need it (pip install sympy, '
-                'rosdep key python3-sympy); decimal ones do not, give --degrees or --radians'
-            ) from error
-        super().__init__()
-        self._sympy = sympy
+    def __init__(self, exact: bool) -> None:
+        self.symbols: dict[str, Cell] = {}
         self._thetas: dict[int, Cell] = {}
+        self._sympy: Any = None
+        if exact:
+            try:
+                import sympy
+            except ImportError as error:
+                raise MissingDependencyError(
+                    'sympy is not installed: exact and symbolic answers need it (pip install '
+                    'sympy, rosdep key python3-sympy); decimal ones do not, give --degrees or '
+                    '--radians') from error
+            self._sympy = sympy
 
     def number(self, value: float) -> Cell:
-        """Return the fraction that was printed."""
-        return self._sympy.Rational(Fraction(repr(value)))
+        """Return a number, exact as the fraction that was printed."""
+        return self._sympy.Rational(Fraction(repr(value))) if self._sympy else value
 
     def mm(self, metres: float) -> Cell:
-        """Return a length in mm as the fraction that was printed."""
+        """Return a length in mm, likewise."""
+        if not self._sympy:
+            return 1000 * metres
         return self._sympy.Rational(Fraction(f'{1000 * metres:.12g}'))
 
     def angle(self, radians: float) -> Cell:
-        """Return an angle as a part of pi if its degrees have at most four decimals, to 1e-12."""
+        """Return an angle, exact as a part of pi if its degrees have at most four decimals."""
         degrees = Fraction(f'{math.degrees(radians):.12g}')
-        if 10_000 % degrees.denominator == 0:
+        if self._sympy and 10_000 % degrees.denominator == 0:
             return self._sympy.pi * self._sympy.Rational(degrees) / 180
         return self.number(radians)
 
     def joint(self, index: int, link: DHLink, q: float | None) -> tuple[Cell, Cell]:
         """Return theta and d of a row; a joint without a value brings its symbol."""
         theta, d = self.angle(link.offset), self.mm(link.d)
-        symbol = self._sympy.Symbol(f'q_{index}')
-        if link.is_prismatic:
-            d = (self._define(f'd_{index}', link.sign * symbol + d) if q is None
-                 else d + link.sign * self.mm(q))
-        elif not link.is_fixed:
-            theta = (self._define(f'theta_{index}', link.sign * symbol + theta) if q is None
-                     else theta + link.sign * self.angle(q))
-        return theta, d
+        if link.is_fixed:
+            return theta, d
+        position = (self._sympy.Symbol(f'q_{index}') if q is None
+                    else self.mm(q) if link.is_prismatic else self.angle(q))
+        name, value = ((f'd_{index}', d) if link.is_prismatic else (f'theta_{index}', theta))
+        moved = link.sign * position + value
+        if q is None:
+            moved = self._define(name, moved)
+        return (theta, moved) if link.is_prismatic else (moved, d)
 
     def cos_sin(self, index: int, theta: Cell) -> tuple[Cell, Cell]:
         """Return cosine and sine of a row's theta: c_i and s_i if it is a symbol."""
@@ -185,22 +151,24 @@ class Exact(Decimals):
 
     def cos_sin_constant(self, angle: Cell) -> tuple[Cell, Cell]:
         """Return cosine and sine of an angle that is no joint's."""
+        if not self._sympy:
+            return cos_sin(float(angle))
         return self._sympy.cos(angle), self._sympy.sin(angle)
 
     def running_products(self, steps: Sequence[Step], modified: bool) -> list[Matrix]:
         """Return T_01, T_02, ... T_0m, with the angles of joints on parallel axes added up."""
-        zero, one = self._sympy.Integer(0), self._sympy.Integer(1)
+        zero, one = self.number(0.0), self.number(1.0)
         products: list[Matrix] = []
         base: Matrix | None = None
         turned: list[tuple[int, int]] = []  # joints since base, and the sense of each
         x, y, z, sense = zero, zero, zero, 1  # translation since base; -1 once z points back
 
         def behind(ca: Cell, sa: Cell) -> Matrix:
-            c, s = self._cos_sin_sum(turned) if turned else (one, zero)
+            c, s = self._cos_sin_sum(turned)
             within = [[c, -s * ca, s * sa, x], [s, c * ca, -c * sa, y], [zero, sa, ca, z],
                       [0, 0, 0, 1]]
             T = within if base is None else product(base, within)
-            return [[self._sympy.expand(cell) for cell in row] for row in T]
+            return [[self._sympy.expand(cell) for cell in row] for row in T] if self._sympy else T
 
         for step in steps:
             for part in ('link', 'joint') if modified else ('joint', 'link'):
@@ -208,7 +176,7 @@ class Exact(Decimals):
                     turned.append((step.index, sense))
                     z += sense * step.d
                     continue
-                c, s = self._cos_sin_sum(turned) if turned else (one, zero)
+                c, s = self._cos_sin_sum(turned)
                 x, y = x + c * step.a, y + s * step.a
                 ca, sa = (sense * value for value in self.cos_sin_constant(step.alpha))
                 if sa == 0:
@@ -223,6 +191,8 @@ class Exact(Decimals):
     def _cos_sin_sum(self, turned: Sequence[tuple[int, int]]) -> tuple[Cell, Cell]:
         """Return cosine and sine of a sum of thetas: numbers if they are simple, else symbols."""
         angles = [(index, sense * self._thetas[index]) for index, sense in turned]
+        if not self._sympy:
+            return self.cos_sin_constant(sum(angle for _, angle in angles))
         joints = [index for index, angle in angles if not angle.is_number]
         constant = sum((angle for _, angle in angles if angle.is_number),
                        start=self._sympy.Integer(0))
@@ -250,7 +220,7 @@ def work_out(version: ChainVersion, chain: Chain, foot_frame: str | None,
 
     Numbers stay exact where joints are symbols, or on request, which needs sympy.
     """
-    algebra = Exact() if exact or q is None else Decimals()
+    algebra, decimals = Algebra(exact or q is None), Algebra(False)
     steps = _steps(chain, q, algebra)
     tip, sole = _TIP_SYMBOLS.get(chain.tip, ('E', 'S'))
     tips = []
@@ -260,12 +230,12 @@ def work_out(version: ChainVersion, chain: Chain, foot_frame: str | None,
     if not np.array_equal(T_dh_tip, np.eye(4)):
         tips.append((f'T_{tip}{sole}', T_dh_tip))
         tip = sole
-    T: Array = np.array(_matrix(chain.T_root_0, Decimals()))
+    T: Array = np.array(_matrix(chain.T_root_0, decimals))
     frames = {'0': T}
-    for step in _steps(chain, [0.0] * chain.n if q is None else q, Decimals()):
+    for step in _steps(chain, [0.0] * chain.n if q is None else q, decimals):
         T = frames[str(step.index + 1)] = T @ np.array(step.A)
     for name, placed in tips:
-        T = frames[name[3:]] = T @ np.array(_matrix(placed, Decimals()))
+        T = frames[name[3:]] = T @ np.array(_matrix(placed, decimals))
     exact_tips = [(name, _matrix(placed, algebra)) for name, placed in tips]
     T_root_0 = _matrix(chain.T_root_0, algebra)
     T_root_tip = product(T_root_0, steps[-1].T_0)
@@ -281,7 +251,7 @@ def product(A: Matrix, B: Matrix) -> Matrix:
              for column in zip(*B, strict=True)] for row in A]
 
 
-def _matrix(T: Array, algebra: Decimals) -> Matrix:
+def _matrix(T: Array, algebra: Algebra) -> Matrix:
     """Return a constant transform, whose translation is in metres, in mm."""
     rows = [[algebra.number(value) for value in row] for row in T.tolist()]
     for row, metres in zip(rows, T[:3, 3].tolist()):
@@ -289,7 +259,7 @@ def _matrix(T: Array, algebra: Decimals) -> Matrix:
     return rows
 
 
-def _steps(chain: Chain, q: Sequence[float] | None, algebra: Decimals) -> list[Step]:
+def _steps(chain: Chain, q: Sequence[float] | None, algebra: Algebra) -> list[Step]:
     names = iter(chain.joint_names)
     given: Iterator[float | None] = iter([None] * chain.n if q is None else q)
     modified = chain.convention == 'modified'
