@@ -7,7 +7,7 @@ import struct
 
 from hypothesis import strategies as st
 from icub_leg_fk.errors import MalformedMessageError
-from icub_leg_fk.ros.cdr import decode_joint_state
+from icub_leg_fk.ros.cdr import read_layout
 from icub_leg_fk.ros.joint_input import JointInput
 from joint_model import JointModel, LARGEST, Message
 
@@ -19,6 +19,16 @@ SPECIAL = (math.nan, math.inf, -math.inf, 0.0, -0.0, 1.0, math.nextafter(1.0, 2.
 def bits(values):
     """Return floats as bytes, for an equality that tells -0.0 from 0.0."""
     return None if values is None else struct.pack(f'{len(values)}d', *values)
+
+
+def decode_joint_state(data):
+    """Return a serialized JointState as a message; raise MalformedMessageError if it is none."""
+    layout = read_layout(data)
+    sec, nanosec = struct.unpack_from(f'{layout.byte_order}iI', data, 4)
+    positions, velocities = (
+        struct.unpack_from(f'{layout.byte_order}{n}d', data, at)
+        for at, n in (layout.positions, layout.velocities))
+    return Message(sec, nanosec, layout.names, positions, velocities)
 
 
 class Trial:

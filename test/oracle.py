@@ -171,3 +171,16 @@ def product(chain: Chain, q: Sequence[float]) -> np.ndarray:
         turn, slide = (0.0, moved) if link.joint_type == 'prismatic' else (moved, 0.0)
         T = T @ basic_product(link.a, link.d + slide, link.alpha, link.offset + turn)
     return T @ chain.T_n_tip
+
+
+def quaternion_to_matrix(quaternion: Any) -> Any:
+    """Return the (..., 3, 3) rotation matrices of (..., 4) unit quaternions x, y, z, w."""
+    x, y, z, w = np.moveaxis(np.asarray(quaternion, dtype=float), -1, 0)
+    R = np.empty((*x.shape, 3, 3))
+    R[..., 0, 0] = 1 - 2 * (y * y + z * z)
+    R[..., 1, 1] = 1 - 2 * (x * x + z * z)
+    R[..., 2, 2] = 1 - 2 * (x * x + y * y)
+    R[..., 0, 1], R[..., 1, 0] = 2 * (x * y - w * z), 2 * (x * y + w * z)
+    R[..., 0, 2], R[..., 2, 0] = 2 * (x * z + w * y), 2 * (x * z - w * y)
+    R[..., 1, 2], R[..., 2, 1] = 2 * (y * z - w * x), 2 * (y * z + w * x)
+    return R

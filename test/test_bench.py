@@ -4,8 +4,8 @@ from pathlib import Path
 import subprocess
 import sys
 
-from icub_leg_fk.kinematics import quaternion_to_matrix
 import numpy as np
+from oracle import quaternion_to_matrix
 import pytest
 
 ROOT = Path(__file__).parents[1]

@@ -8,13 +8,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from icub_leg_fk.errors import MalformedMessageError
 from icub_leg_fk.ros.cdr import (
-    decode_joint_state,
     PoseStampedEncoder,
     TFMessageEncoder,
     TwistStampedEncoder,
 )
 from joint_model import Message
-from joint_trial import bits
+from joint_trial import bits, decode_joint_state
 import pytest
 
 TEXT = st.text(max_size=30)  # every character but lone surrogates, NUL included

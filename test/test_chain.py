@@ -10,9 +10,9 @@ from any_chain import chain_of, CHAINS, chains_and_positions
 from hypothesis import given
 from hypothesis import strategies as st
 from icub_leg_fk.errors import JointVectorError, LegFKError
-from icub_leg_fk.kinematics import Catalog, Chain, DHLink, quaternion_to_matrix
+from icub_leg_fk.kinematics import Catalog, Chain, DHLink
 import numpy as np
-from oracle import product
+from oracle import product, quaternion_to_matrix
 import pytest
 
 

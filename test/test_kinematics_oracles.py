@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from icub_leg_fk.kinematics import Catalog, quaternion_to_matrix
+from icub_leg_fk.kinematics import Catalog
 import numpy as np
-from oracle import CASES, HandMadeArm, KDLArm, PinocchioArm, TABLES
+from oracle import CASES, HandMadeArm, KDLArm, PinocchioArm, quaternion_to_matrix, TABLES
 import pytest
 
 CONFIGURATIONS = 1000

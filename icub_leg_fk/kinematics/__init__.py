@@ -10,7 +10,7 @@ from typing import Any, TYPE_CHECKING
 from icub_leg_fk.kinematics.catalog import Catalog, config_file, load_chain
 from icub_leg_fk.kinematics.chain import Chain
 from icub_leg_fk.kinematics.link import DHLink
-from icub_leg_fk.kinematics.rotation import matrix_to_quaternion, quaternion_to_matrix
+from icub_leg_fk.kinematics.rotation import matrix_to_quaternion
 
 if TYPE_CHECKING:
     from icub_leg_fk.kinematics.table_from_urdf import chain_from_urdf
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     'Catalog', 'Chain', 'DHLink', 'Urdf', 'chain_from_urdf', 'config_file', 'load_chain',
-    'matrix_to_quaternion', 'quaternion_to_matrix',
+    'matrix_to_quaternion',
 ]
 
 

@@ -52,8 +52,7 @@ def matrix_to_quaternion(rotation: ArrayLike) -> Array:
         rotation: (..., 3, 3) rotation matrices.
 
     Returns:
-        (..., 4) quaternions x, y, z, w with norm 1 and w >= 0; where w is 0 the first non-zero
-        component is positive.
+        (..., 4) quaternions x, y, z, w with norm 1 and w >= 0, and no negative zeros.
     """
     R = np.asarray(rotation, dtype=float)
     r00, r11, r22 = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
@@ -70,23 +69,8 @@ def matrix_to_quaternion(rotation: ArrayLike) -> Array:
     ], axis=-2)
     largest = np.argmax(np.diagonal(outer, axis1=-2, axis2=-1), axis=-1)
     q = np.take_along_axis(outer, largest[..., None, None], axis=-2)[..., 0, :]
-    return canonical_quaternion(q / np.linalg.norm(q, axis=-1, keepdims=True))
-
-
-def canonical_quaternion(quaternion: ArrayLike) -> Array:
-    """Return the one of the two equivalent quaternions q and -q that has w >= 0.
-
-    Args:
-        quaternion: (..., 4) quaternions x, y, z, w.
-
-    Returns:
-        (..., 4) the same rotations with w >= 0, and no negative zeros; where w is 0 the first
-        non-zero component is positive.
-    """
-    q = np.asarray(quaternion, dtype=float)
-    x, y, z, w = np.moveaxis(q, -1, 0)
-    leading = np.where(w != 0, w, np.where(x != 0, x, np.where(y != 0, y, z)))
-    return np.asarray(np.where(leading[..., None] < 0, -q, q) + 0.0)
+    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    return np.asarray(np.where(q[..., 3:] < 0, -q, q) + 0.0)
 
 
 def reference_quaternion(quaternion: ArrayLike) -> Array:
@@ -104,26 +88,6 @@ def reference_quaternion(quaternion: ArrayLike) -> Array:
         size = np.abs(q[:3])
         leading = q[np.argmax(size > size.max() - _LIKELY)]
     return -q if leading < 0 else q
-
-
-def quaternion_to_matrix(quaternion: ArrayLike) -> Array:
-    """Convert unit quaternions to rotation matrices.
-
-    Args:
-        quaternion: (..., 4) unit quaternions x, y, z, w.
-
-    Returns:
-        (..., 3, 3) rotation matrices.
-    """
-    x, y, z, w = np.moveaxis(np.asarray(quaternion, dtype=float), -1, 0)
-    R = np.empty((*x.shape, 3, 3))
-    R[..., 0, 0] = 1 - 2 * (y * y + z * z)
-    R[..., 1, 1] = 1 - 2 * (x * x + z * z)
-    R[..., 2, 2] = 1 - 2 * (x * x + y * y)
-    R[..., 0, 1], R[..., 1, 0] = 2 * (x * y - w * z), 2 * (x * y + w * z)
-    R[..., 0, 2], R[..., 2, 0] = 2 * (x * z + w * y), 2 * (x * z - w * y)
-    R[..., 1, 2], R[..., 2, 1] = 2 * (y * z - w * x), 2 * (y * z + w * x)
-    return R
 
 
 def turns_about(axis: Array, angle: ArrayLike) -> Array:

@@ -18,7 +18,7 @@ import struct
 from typing import NamedTuple
 
 from icub_leg_fk.errors import MalformedMessageError
-from icub_leg_fk.kinematics.solver import Pose, Twist
+from icub_leg_fk.kinematics.solver import Pose
 
 BYTE_ORDERS = {b'\x00\x01': '<', b'\x00\x00': '>'}
 HEADER = 4  # bytes of the encapsulation, from whose end alignment counts
@@ -56,16 +56,6 @@ class JointStateLayout(NamedTuple):
     efforts: Doubles
 
 
-class JointStateMessage(NamedTuple):
-    """The fields of a JointState that matter here: stamp, names, positions and velocities."""
-
-    sec: int
-    nanosec: int
-    names: tuple[str, ...]
-    positions: tuple[float, ...]
-    velocities: tuple[float, ...]
-
-
 def read_layout(data: bytes) -> JointStateLayout:
     """Find out where things lie in a serialized JointState.
 
@@ -84,62 +74,30 @@ def read_layout(data: bytes) -> JointStateLayout:
         reader.doubles, ('position', 'velocity', 'effort')))
 
 
-def decode_joint_state(data: bytes) -> JointStateMessage:
-    """Decode a serialized JointState.
+class _StampedEncoder:
+    """Serializes messages of a stamp, one frame id and some numbers."""
 
-    Raises:
-        MalformedMessageError: as for `read_layout`.
-    """
-    layout = read_layout(data)
-    sec, nanosec = struct.unpack_from(f'{layout.byte_order}iI', data, HEADER)
-    positions, velocities = (
-        struct.unpack_from(f'{layout.byte_order}{n}d', data, at)
-        for at, n in (layout.positions, layout.velocities))
-    return JointStateMessage(sec, nanosec, layout.names, positions, velocities)
-
-
-class PoseStampedEncoder:
-    """Serializes geometry_msgs/PoseStamped messages of one frame id.
-
-    Args:
-        frame_id: the frame the poses are given in.
-    """
+    numbers = 0
 
     def __init__(self, frame_id: str) -> None:
         self._frame_id = _aligned(STAMP_END - HEADER, _string(frame_id), 8)
-        self._pack = struct.Struct(f'<4siI{len(self._frame_id)}s7d').pack
+        self._pack = struct.Struct(f'<4siI{len(self._frame_id)}s{self.numbers}d').pack
 
-    def encode(self, sec: int, nanosec: int, pose: Pose) -> bytes:
-        """Return the bytes of one message.
-
-        Args:
-            sec: seconds of the stamp.
-            nanosec: nanoseconds of the stamp.
-            pose: x, y, z [m], qx, qy, qz, qw.
-        """
-        return self._pack(_ENCAPSULATION, sec, nanosec, self._frame_id, *pose)
+    def encode(self, sec: int, nanosec: int, numbers: Sequence[float]) -> bytes:
+        """Return the bytes of one message, from its stamp and its numbers."""
+        return self._pack(_ENCAPSULATION, sec, nanosec, self._frame_id, *numbers)
 
 
-class TwistStampedEncoder:
-    """Serializes geometry_msgs/TwistStamped messages of one frame id.
+class PoseStampedEncoder(_StampedEncoder):
+    """Serializes geometry_msgs/PoseStamped: x, y, z [m], qx, qy, qz, qw in a frame."""
 
-    Args:
-        frame_id: the frame in whose axes the twists are given.
-    """
+    numbers = 7
 
-    def __init__(self, frame_id: str) -> None:
-        self._frame_id = _aligned(STAMP_END - HEADER, _string(frame_id), 8)
-        self._pack = struct.Struct(f'<4siI{len(self._frame_id)}s6d').pack
 
-    def encode(self, sec: int, nanosec: int, twist: Twist) -> bytes:
-        """Return the bytes of one message.
+class TwistStampedEncoder(_StampedEncoder):
+    """Serializes geometry_msgs/TwistStamped: vx, vy, vz [m/s], wx, wy, wz [rad/s] in its axes."""
 
-        Args:
-            sec: seconds of the stamp.
-            nanosec: nanoseconds of the stamp.
-            twist: vx, vy, vz [m/s], wx, wy, wz [rad/s].
-        """
-        return self._pack(_ENCAPSULATION, sec, nanosec, self._frame_id, *twist)
+    numbers = 6
 
 
 class TFMessageEncoder:

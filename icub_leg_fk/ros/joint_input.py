@@ -36,7 +36,6 @@ from icub_leg_fk.ros.cdr import HEADER, JointStateLayout, read_layout, STAMP_END
 
 LARGEST_VALUE = 1e150  # of a position or velocity; beyond it sums and products overflow
 MESSAGE_REASONS = ('malformed', 'empty_position', 'short_position', 'duplicate_name', 'time_jump')
-CHAIN_REASONS = ('missing_joint', 'non_finite', 'stale_joint', 'no_velocity')
 
 _REMEMBERED_LAYOUTS = 8
 _LARGEST_REMEMBERED = 16384  # bytes of names; what a stranger sends may be larger

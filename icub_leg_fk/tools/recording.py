@@ -89,12 +89,6 @@ def time_span(tracks: Sequence[ChainTrack]) -> tuple[float, float]:
             max(float(track.times.max()) for track in tracks))
 
 
-class _Clock:
-    """Knows when the bag received the present message, for one without a stamp [ns]."""
-
-    now = 0
-
-
 def read_bag(path: Path, chains: Sequence[Chain], topic: str | None) -> Tracks:
     """Return what some chains did in a bag, by the node's own input rules.
 
@@ -106,10 +100,11 @@ def read_bag(path: Path, chains: Sequence[Chain], topic: str | None) -> Tracks:
 
     stamps = [array('q') for _ in chains]
     positions = [array('d') for _ in chains]
-    clock = _Clock()
-    joint_input = JointInput(chains, DEFAULT_TIMEOUT, lambda: clock.now)
+    now = 0  # when the bag received the present message [ns], for one without a stamp
+    joint_input = JointInput(chains, DEFAULT_TIMEOUT, lambda: now)
     with open_bag(path) as reader:
-        for _, clock.now, data in messages(reader, path, joint_connections(reader, path, topic)):
+        for _, received, data in messages(reader, path, joint_connections(reader, path, topic)):
+            now = received
             for vector in joint_input.feed(data):
                 stamps[vector.chain].append(vector.sec * 1_000_000_000 + vector.nanosec)
                 positions[vector.chain].extend(vector.positions)
