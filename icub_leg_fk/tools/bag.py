@@ -177,7 +177,8 @@ class _Job:
         wanted = list({connection.id: connection for connection in (
             *self._kept, *(c for c in self._reader.connections if c.id in self._joint_ids))
             }.values())
-        write, feed, joint_ids = writer.write, self._input.feed, self._joint_ids
+        write, feed = writer.write, self._input.feed
+        joint_ids, own_tf = self._joint_ids, self._own_tf
         total = sum(connection.msgcount for connection in wanted) or 1
         for number, (connection, timestamp, data) in enumerate(
                 messages(self._reader, self._source, wanted)):
@@ -185,15 +186,13 @@ class _Job:
                 self._first = timestamp
             self._last = max(timestamp, self._last)
             if (copy := copies.get(connection.id)) is not None:
-                kept = (self._without_own_transforms(data) if connection.id in self._own_tf
-                        else data)
+                kept = self._without_own_transforms(data) if connection.id in own_tf else data
                 if kept is not None:
                     write(copy, timestamp, kept)
                     self._copied += 1
             if connection.id in joint_ids:
                 self._time = timestamp
-                vectors = feed(data)
-                for topic, message in self._messages(vectors):
+                for topic, message in self._messages(feed(data)):
                     write(added[topic], timestamp, message)
                     self._added[topic] += 1
             if progress is not None and number % 1000 == 0:
@@ -239,24 +238,26 @@ class _Job:
         if self._configuration.publish_tf:
             yield TF_TOPIC, TF
 
-    def _messages(self, vectors: Sequence[Ready]) -> Iterator[tuple[str, bytes]]:
-        """Yield topic and bytes of what a message of joint states has made ready."""
-        twist, tf = self._configuration.publish_twist, self._configuration.publish_tf
-        poses = []
+    def _messages(self, vectors: Sequence[Ready]) -> list[tuple[str, bytes]]:
+        """Return topic and bytes of what a message of joint states has made ready."""
+        messages, poses = [], []
         for index, sec, nanosec, q, qdot in vectors:
             output = self._outputs[index]
             pose = output.chain.pose(q)
             poses.append(pose)
-            yield output.pose_topic, output.encode_pose(sec, nanosec, pose)
-            if twist and qdot is not None:
-                yield output.twist_topic, output.encode_twist(sec, nanosec,
-                                                              output.chain.twist(q, qdot))
-            elif twist:
+            messages.append((output.pose_topic, output.encode_pose(sec, nanosec, pose)))
+            if not self._configuration.publish_twist:
+                continue
+            if qdot is None:
                 self._input.note_no_velocity(index)
-        if tf and poses:
+            else:
+                messages.append((output.twist_topic, output.encode_twist(
+                    sec, nanosec, output.chain.twist(q, qdot))))
+        if self._configuration.publish_tf and poses:
             from icub_leg_fk.ros.cdr import TFMessageEncoder
             encoder = TFMessageEncoder([self._outputs[vector.chain].frames for vector in vectors])
-            yield TF_TOPIC, encoder.encode(vectors[0].sec, vectors[0].nanosec, poses)
+            messages.append((TF_TOPIC, encoder.encode(sec, nanosec, poses)))
+        return messages
 
     def _copy(self, writer: Any, connection: Any) -> Any:
         """Add a connection like one of the source."""

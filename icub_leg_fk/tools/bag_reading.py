@@ -76,15 +76,10 @@ def messages(reader: Any, path: str | Path, connections: Sequence[Any]
     Raises:
         InputFileError: the recording is damaged; says how, and what mends it.
     """
-    source = reader.messages(connections=connections)
-    while True:
-        try:
-            message = next(source)
-        except StopIteration:
-            return
-        except Exception as error:
-            raise unreadable(path, error) from error
-        yield message
+    try:
+        yield from reader.messages(connections=connections)
+    except Exception as error:
+        raise unreadable(path, error) from error
 
 
 def joint_connections(reader: Any, path: str | Path, topic: str | None) -> list[Any]:
