@@ -15,7 +15,8 @@ def near(name: str, choices: Iterable[str]) -> str | None:
     two from ten characters on.
     """
     slips = 2 if len(name) >= _LONG_NAME else 1
-    distances = {choice: _edit_distance(name, choice) for choice in choices if choice != name}
+    distances = {choice: _edit_distance(name, choice) for choice in choices
+                 if choice != name and abs(len(choice) - len(name)) <= slips}
     close = [choice for choice, distance in distances.items()
              if distance <= slips and distance < len(name)]
     return min(close, key=distances.__getitem__, default=None)

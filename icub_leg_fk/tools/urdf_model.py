@@ -16,6 +16,7 @@ from icub_leg_fk.errors import LegFKError
 from icub_leg_fk.kinematics.catalog import ChainEntry, ChainVersion
 from icub_leg_fk.kinematics.link import DHLink
 from icub_leg_fk.kinematics.rotation import Array
+from icub_leg_fk.ros.configuration import SOLE_OUTLINE
 import numpy as np
 
 # URDF demands both, the tables give neither: values that hinder nobody.
@@ -23,7 +24,7 @@ EFFORT = VELOCITY = '50000'
 
 COLOURS = {'bone': '0.82 0.82 0.85 1', 'joint': '0.25 0.27 0.32 1', 'tip': '0.90 0.45 0.10 1'}
 BONE_RADIUS, JOINT_RADIUS, TIP_RADIUS = 0.012, 0.022, 0.015  # m
-SOLE_SIZE, SOLE_CENTRE = '0.16 0.07 0.02', (0.03, 0.0, 0.01)  # m, in the sole's axes
+SOLE_THICKNESS = 0.02  # m
 
 
 class Selection(NamedTuple):
@@ -120,7 +121,7 @@ class _Tree:
                                      origin @ table.T_n_tip @ frame.T_dh_tip, parent, frame.frame))
             tip = ET.SubElement(self._root, 'link', name=frame.frame)
             if name == 'sole':
-                ET.SubElement(_visual(tip, 'tip', np.array(SOLE_CENTRE)), 'box', size=SOLE_SIZE)
+                _sole(tip)
             elif 'sole' not in table.tip_frames:
                 _ball(tip, 'tip', TIP_RADIUS)
 
@@ -184,6 +185,13 @@ def _visual(link: ET.Element, colour: str, xyz: Array, rpy: Array | None = None)
 
 def _ball(link: ET.Element, colour: str, radius: float) -> None:
     ET.SubElement(_visual(link, colour, np.zeros(3)), 'sphere', radius=repr(radius))
+
+
+def _sole(link: ET.Element) -> None:
+    corners = np.array(SOLE_OUTLINE)
+    centre = (corners.min(axis=0) + corners.max(axis=0) + (0.0, 0.0, SOLE_THICKNESS)) / 2
+    x, y, _ = np.ptp(corners, axis=0).tolist()
+    ET.SubElement(_visual(link, 'tip', centre), 'box', size=f'{x:g} {y:g} {SOLE_THICKNESS:g}')
 
 
 def _bone(link: ET.Element, end: Array) -> None:
