@@ -1,4 +1,4 @@
-"""The gait the project makes: both feet walk, every joint stays in its documented range."""
+"""The gait that the demonstration plays: both feet walk, joints stay in their printed ranges."""
 
 from gait import PERIOD, walk
 from icub_leg_fk.kinematics import Catalog
@@ -42,11 +42,6 @@ def test_every_joint_moves_in_every_version(catalog):
         assert (np.ptp(walk(catalog, version).positions, axis=0) > np.radians(2)).all(), version
 
 
-def test_names_all_twelve_leg_joints(gait):
-    joints = ('hip_pitch', 'hip_roll', 'hip_yaw', 'knee', 'ankle_pitch', 'ankle_roll')
-    assert gait.joint_names == tuple(f'{side}_{joint}' for side in 'lr' for joint in joints)
-
-
 def test_soles_stay_level_and_face_forward(soles):
     for sole in soles:
         assert np.abs(sole[:, :3, :3] - np.diag([-1, -1, 1])).max() < 1e-6
@@ -67,12 +62,6 @@ def test_one_foot_stands_at_any_time_and_both_for_a_while(soles):
     assert np.abs(steps).max() < 1e-9
 
 
-def test_steps_are_ten_to_twenty_centimetres_long_both_ways(soles):
-    ahead = soles[1][:, 0, 3] - soles[0][:, 0, 3]  # of the left foot; x is backward
-    assert 0.1 < ahead.max() < 0.2
-    assert 0.1 < -ahead.min() < 0.2
-
-
 def test_standing_foot_moves_backward_and_swinging_foot_forward(soles):
     for foot, other in (soles, soles[::-1]):
         dx = np.gradient(foot[:, 0, 3])
@@ -88,17 +77,6 @@ def test_pelvis_sways_over_the_standing_foot_and_feet_never_collide(soles):
     assert (middle[left_swings] < -0.01).all()  # the pelvis is right of the middle
     assert (middle[right_swings] > 0.01).all()
     assert (right[:, 1] - left[:, 1]).min() > 0.1
-
-
-def test_right_leg_does_what_the_left_did_half_a_period_before(gait):
-    half = round(PERIOD * RATE / 2)
-    left, right = gait.positions[:-half, :6], gait.positions[half:, 6:]
-    assert np.abs(left - right).max() < 1e-9
-
-
-def test_repeats_every_period(gait):
-    samples = round(PERIOD * RATE)
-    assert np.array_equal(gait.positions[samples:], gait.positions[:samples])
 
 
 def test_the_walk_that_is_shipped_is_this_gait(catalog):
