@@ -1,10 +1,12 @@
 """Settings of every test run: ROS 2 stays on this machine, in a domain of the run's own."""
 
 import os
+import re
 import signal
 import socket
 
 from hypothesis import settings
+import pytest
 
 # The ports by which domain_coordinator, ROS 2's own tool for this, marks a domain as taken.
 PORT_BASE = 32768
@@ -38,3 +40,13 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)
 # How long an example takes says nothing on a busy machine.
 settings.register_profile('icub_leg_fk', deadline=None)
 settings.load_profile('icub_leg_fk')
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_make_collect_report(collector):
+    """Skip a file of tests, with the reason, whose imports from ROS 2 are not installed."""
+    report = (yield).get_result()
+    missing = re.search(r"No module named '(rclpy|\w+_(?:msgs|interfaces))", str(report.longrepr))
+    if report.failed and missing:
+        report.outcome = 'skipped'
+        report.longrepr = (str(collector.path), 1, f'Skipped: needs {missing[1]} of ROS 2')
