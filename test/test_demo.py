@@ -21,7 +21,8 @@ import numpy as np
 import pytest
 
 pytest.importorskip('matplotlib')
-replays = pytest.importorskip('icub_leg_fk.tools.demo_replay', reason='needs rclpy')
+pytest.importorskip('rclpy', reason='needs ROS 2')
+replays = pytest.importorskip('icub_leg_fk.tools.demo_replay')
 
 DEMO = (sys.executable, '-m', 'icub_leg_fk.tools.leg_fk', 'demo')
 TIPS = ('left_foot', 'right_foot')
