@@ -361,8 +361,8 @@ def test_recordings_of_rosbag2_are_taken_message_for_message(tmp_path):
                   if entry['topic_metadata']['name'] == '/joint_states')
         assert (summary.copied, summary.joint_states) == (information['message_count'], count)
         assert summary.added == {LEFT_POSE: count, RIGHT_POSE: count}
-        found = recording.read_bag(RECORDINGS / name, LEG_CHAINS, None)  # as leg_fk plot reads it
-        assert [len(track.times) for track in found.tracks] == [count, count]
+        tracks, _ = recording.read_bag(RECORDINGS / name, LEG_CHAINS, None)  # as for leg_fk plot
+        assert [len(track.times) for track in tracks] == [count, count]
         topics, messages = read_bag(RECORDINGS / name)
         new_topics, new_messages = read_bag(tmp_path / name)
         assert {topic: new_topics[topic] for topic in topics} == topics
@@ -394,8 +394,8 @@ def test_what_is_no_recording_of_ros_2_is_called_by_its_name(tmp_path):
     refused(tmp_path, tmp_path / 'old.bag', 'is a ROS 1 bag')
     writer_module = pytest.importorskip('mcap.writer')
     for profile, encoding, words in (('ros1', 'ros1', 'is an MCAP file of ROS 1 messages'),
-                                     ('', 'json', 'not CDR: /joints (json)'),
-                                     ('ros2', 'json', 'not CDR: /joints (json)')):
+                                     ('', 'json', '/joints (json) are not CDR'),
+                                     ('ros2', 'json', '/joints (json) are not CDR')):
         file = tmp_path / f'{profile}_{encoding}.mcap'
         writer = writer_module.Writer(str(file))
         writer.start(profile)

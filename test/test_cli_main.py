@@ -9,7 +9,7 @@ import sys
 
 import icub_leg_fk
 from icub_leg_fk.kinematics.catalog import config_file
-from icub_leg_fk.tools.leg_fk import MODULES
+from icub_leg_fk.tools.leg_fk import COMMANDS
 from leg_fk_process import assert_one_line_complaint, COMMAND, leg_fk
 import pytest
 
@@ -23,7 +23,7 @@ def test_help_lists_every_command_with_one_line_and_examples():
         assert f'\n  leg_fk {command}' in examples
 
 
-@pytest.mark.parametrize('command', MODULES)
+@pytest.mark.parametrize('command', COMMANDS)
 def test_every_command_has_help_with_examples(command):
     done = leg_fk(command, '-h')
     assert (done.returncode, done.stderr) == (0, '')
@@ -35,7 +35,7 @@ def test_version_is_the_packages():
     assert leg_fk('--version').stdout == f'leg_fk {icub_leg_fk.__version__}\n'
 
 
-@pytest.mark.parametrize('words', [['-h'], ['pose', '-h'], ['--version']])
+@pytest.mark.parametrize('words', [['-h'], [], ['--version']])
 def test_help_imports_nothing_heavy(words):
     program = ('import sys; from icub_leg_fk.tools.leg_fk import main; main(sys.argv[1:]); '
                "print(*sorted(sys.modules), sep='\\n', file=sys.stderr)")
@@ -60,7 +60,7 @@ def test_a_command_imports_only_its_own_module():
     done = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True,
                           timeout=60)
     tools = {module.removeprefix('icub_leg_fk.tools.') for module in done.stderr.split()}
-    assert tools & set(MODULES.values()) == {'list_chains'}
+    assert tools & {module for module, _ in COMMANDS.values()} == {'list_chains'}
 
 
 def test_help_is_there_at_once():
@@ -134,7 +134,7 @@ def test_a_mistake_is_one_line_and_exit_2(words, complaint):
 def test_alone_it_lists_its_commands():
     done = leg_fk()
     assert (done.returncode, done.stderr) == (0, '')
-    assert all(f'\n    {command} ' in done.stdout for command in MODULES)
+    assert all(f'\n    {command} ' in done.stdout for command in COMMANDS)
 
 
 @pytest.mark.parametrize(('words', 'complaint'), [

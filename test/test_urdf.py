@@ -7,7 +7,7 @@ from xml.etree import ElementTree as ET
 
 from icub_leg_fk.kinematics import Catalog
 from icub_leg_fk.tools.leg_fk import main
-from icub_leg_fk.tools.urdf_model import xyz_rpy
+from icub_leg_fk.tools.urdf import xyz_rpy
 from leg_fk_process import assert_one_line_complaint, leg_fk
 import numpy as np
 import pytest

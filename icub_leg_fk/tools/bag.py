@@ -5,23 +5,23 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 import re
 import sqlite3
 import time
-from typing import Any, TYPE_CHECKING
+from typing import Any, NamedTuple
 
 from icub_leg_fk.errors import InputFileError, LegFKError, OutputFileError
-from icub_leg_fk.tools.chain_arguments import DEFAULT_VERSION
+from icub_leg_fk.kinematics import Catalog, Chain
+from icub_leg_fk.ros.cdr import PoseStampedEncoder, TFMessageEncoder, TwistStampedEncoder
+from icub_leg_fk.ros.configuration import Configuration, version_parameter
+from icub_leg_fk.ros.joint_input import JointInput, Ready
+from icub_leg_fk.tools.bag_reading import import_rosbags, joint_connections, messages, open_bag
+from icub_leg_fk.tools.options import DEFAULT_VERSION, LEGS
 from icub_leg_fk.tools.output_file import check_target, is_bag, whole_path
-
-if TYPE_CHECKING:
-    from icub_leg_fk.kinematics import Chain
-    from icub_leg_fk.ros.configuration import Configuration
-    from icub_leg_fk.ros.joint_input import Ready
 
 NODE = '/foot_pose_publisher'
 POSE, TWIST, TF = ('geometry_msgs/msg/PoseStamped', 'geometry_msgs/msg/TwistStamped',
@@ -62,13 +62,13 @@ class Summary:
 
 
 def add_foot_poses(
-        source: str | Path, target: str | Path, *,
-        chains: Sequence[str] = ('left_leg', 'right_leg'), version: str = DEFAULT_VERSION,
-        chain_versions: Mapping[str, str] | None = None, kinematics_file: str | None = None,
-        foot_frame: str = 'dh', frame_prefix: str = '', joint_timeout: float = 0.5,
-        joint_topic: str | None = None, twist: bool = False, tf: bool = False,
-        only_poses: bool = False, replace_poses: bool = False, storage: str = '',
-        force: bool = False, progress: Callable[[float], None] | None = None) -> Summary:
+        source: str | Path, target: str | Path, *, chains: Sequence[str] = LEGS,
+        version: str = DEFAULT_VERSION, chain_versions: Mapping[str, str] | None = None,
+        kinematics_file: str | None = None, foot_frame: str = 'dh', frame_prefix: str = '',
+        joint_timeout: float = 0.5, joint_topic: str | None = None, twist: bool = False,
+        tf: bool = False, only_poses: bool = False, replace_poses: bool = False,
+        storage: str = '', force: bool = False, progress: Callable[[float], None] | None = None
+        ) -> Summary:
     """Copy a recording and add the poses of the feet.
 
     Args:
@@ -95,89 +95,124 @@ def add_foot_poses(
         OutputFileError: the target exists, is part of the source, or cannot be written.
         LegFKError: a choice is not valid.
     """
-    from icub_leg_fk.ros.configuration import version_parameter
-
+    began = time.monotonic()
+    source, target = Path(source), Path(target)
     parameters = {
         'chains': list(chains), 'version': version, 'foot_frame': foot_frame,
         'frame_prefix': frame_prefix, 'joint_timeout': joint_timeout, 'stamp_source': 'message',
         'publish_tf': False, 'publish_twist': twist, 'publish_markers': False}
     parameters |= {version_parameter(chain): own for chain, own in (chain_versions or {}).items()}
-    # Here transforms need no tf2_msgs.
-    configuration = replace(_configuration(parameters, kinematics_file), publish_tf=tf)
-    source, target = Path(source), Path(target)
-    _check_apart(source, target)
-    storage = _storage(target, storage)
+    try:
+        configuration = Configuration.from_parameters(parameters, Catalog.load(kinematics_file))
+    except LegFKError as error:
+        raise LegFKError(_as_options(str(error))) from error
+    configuration = replace(configuration, publish_tf=tf)  # which needs no tf2_msgs here
+    storage = _checked(source, target, storage)
     check_target(target, force=force, may_replace=is_bag)
-    from icub_leg_fk.tools.bag_reading import joint_connections, open_bag
-
-    began = time.monotonic()
     with open_bag(source) as reader:
-        job = _Job(reader, source, configuration,
-                   joint_connections(reader, source, joint_topic), only_poses, replace_poses)
-        if not storage:
-            storage = 'mcap' if _has_mcap(source) else 'sqlite3'
+        job = _Job(reader, source, configuration, joint_topic, only_poses)
+        if not only_poses:
+            job.leave_out_old_poses(replace_poses)
         with whole_path(target, force=force, may_replace=is_bag) as place:
-            _write(place, storage, job, progress)
+            with _writer(place, storage or _storage_of(source)) as writer:
+                job.run(writer, progress)
             job.check_use()
         return job.summary(str(target), time.monotonic() - began)
 
 
-def _write(place: Path, storage: str, job: _Job,
-           progress: Callable[[float], None] | None) -> None:
-    """Write the new recording at a place: a directory, or a file if its name says so."""
-    from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
-
+@contextmanager
+def _writer(place: Path, storage: str) -> Iterator[Any]:
+    """Give what writes a recording at a place: a directory, or a file if its name says so."""
+    rosbag2, _ = import_rosbags()
     ending = place.suffix if place.suffix in STORAGES else ''
     directory = place.with_name(f'{place.stem}.directory') if ending else place
-    plugin = StoragePlugin.MCAP if storage == 'mcap' else StoragePlugin.SQLITE3
     try:
-        with Writer(directory, version=Writer.VERSION_LATEST, storage_plugin=plugin) as writer:
-            job.run(writer, progress)
-    except (sqlite3.Error, WriterError) as error:
+        with rosbag2.Writer(directory, version=rosbag2.Writer.VERSION_LATEST,
+                            storage_plugin=rosbag2.StoragePlugin[storage.upper()]) as writer:
+            yield writer
+    except (sqlite3.Error, rosbag2.WriterError) as error:
         raise OutputFileError(f'{place.name}: cannot be written: {error}') from error
     if ending:
         file, = directory.glob(f'*{ending}')
         file.rename(place)
 
 
+class _Output(NamedTuple):
+    """What one chain's joint vectors become."""
+
+    chain: Chain
+    frames: tuple[str, str]
+    pose_topic: str
+    encode_pose: Callable[..., bytes]
+    twist_topic: str
+    encode_twist: Callable[..., bytes]
+
+
+def _output(chain: Chain, prefix: str) -> _Output:
+    root, topic = prefix + chain.root_frame, f'{NODE}/{chain.tip}'
+    return _Output(chain, (root, prefix + chain.tip_frame),
+                   f'{topic}/pose', PoseStampedEncoder(root).encode,
+                   f'{topic}/twist', TwistStampedEncoder(root).encode)
+
+
 class _Job:
     """A recording, the poses that join it, and what becomes known on the way."""
 
     def __init__(self, reader: Any, source: Path, configuration: Configuration,
-                 joint_connections: list[Any], only_poses: bool, replace_poses: bool) -> None:
-        from icub_leg_fk.ros.joint_input import JointInput
-        from rosbags.typesys import get_typestore, Stores
-
-        self._reader, self._source = reader, source
-        self._configuration = configuration
-        self._store = get_typestore(Stores.ROS2_JAZZY)
-        self._joint_ids = {connection.id for connection in joint_connections}
-        self._time = 0
-        self._first = self._last = 0
-        self._was_held_back: list[Counter[str]] = []
+                 joint_topic: str | None, only_poses: bool) -> None:
+        _, self._typesys = import_rosbags()
+        self._store = self._typesys.get_typestore(self._typesys.Stores.ROS2_JAZZY)
+        self._reader, self._source, self._configuration = reader, source, configuration
+        joint_states = joint_connections(reader, source, joint_topic)
+        self._joint_ids = {connection.id for connection in joint_states}
+        self._kept: list[Any] = [] if only_poses else list(reader.connections)
+        self._own_tf: set[int] = set()  # connections to /tf with frames that are added
+        self._time = self._first = self._last = self._copied = 0
         self._input = JointInput(configuration.chains, configuration.joint_timeout,
                                  lambda: self._time, velocities=configuration.publish_twist)
-        self._outputs = [_ChainOutput(chain, configuration) for chain in configuration.chains]
+        self._outputs = [_output(chain, configuration.frame_prefix)
+                         for chain in configuration.chains]
         self._notes = [*configuration.notes, *configuration.warnings]
-        self._copied = 0
-        self._added: Counter[str] = Counter()
-        self._kept = [] if only_poses else list(reader.connections)
-        self._own_tf: frozenset[int] = frozenset()
-        if not only_poses:
-            self._look_for_old_poses(replace_poses)
+        self._topics: dict[str, str] = {}  # what is added: types by topic
+        for output in self._outputs:
+            self._topics[output.pose_topic] = POSE
+            if configuration.publish_twist:
+                self._topics[output.twist_topic] = TWIST
+        if configuration.publish_tf:
+            self._topics[TF_TOPIC] = TF
+        self._added = dict.fromkeys(self._topics, 0)
+
+    def leave_out_old_poses(self, replace_poses: bool) -> None:
+        """Refuse, or leave out, what the recording already has of what is added."""
+        old = [connection for connection in self._kept
+               if connection.topic in self._topics and connection.topic != TF_TOPIC]
+        found = [connection.topic for connection in old]
+        if self._configuration.publish_tf:
+            transforms = [connection for connection in self._kept
+                          if (connection.topic, connection.msgtype) == (TF_TOPIC, TF)]
+            frames = [output.frames[1] for output in self._outputs]
+            if transforms and any(
+                    frame.encode() + b'\0' in data for _, _, data in
+                    messages(self._reader, self._source, transforms) for frame in frames):
+                found.append(f'{TF_TOPIC} with {", ".join(frames)}')
+                self._own_tf = {connection.id for connection in transforms}
+        if found and not replace_poses:
+            raise InputFileError(f'{self._source}: has {", ".join(found)} already; '
+                                 '--replace-poses leaves these out, --only-poses writes the new '
+                                 'ones alone')
+        self._kept = [connection for connection in self._kept if connection not in old]
+        self._notes += [f'left out: {topic} of the recording' for topic in found]
 
     def run(self, writer: Any, progress: Callable[[float], None] | None) -> None:
         """Copy the messages, each joint state followed by what it gives."""
-        from icub_leg_fk.tools.bag_reading import messages
-
         for key, value in (self._reader.storage.metadata.custom or {}).items():
             writer.set_custom_data(key, str(value))
         copies = {connection.id: self._copy(writer, connection) for connection in self._kept}
-        added = self._add_connections(writer, copies)
-        wanted = list({connection.id: connection for connection in (
-            *self._kept, *(c for c in self._reader.connections if c.id in self._joint_ids))
-            }.values())
-        write, feed = writer.write, self._input.feed
+        added = {topic: self._add(writer, topic, kind, copies)
+                 for topic, kind in self._topics.items()}
+        wanted = [connection for connection in self._reader.connections
+                  if connection.id in copies or connection.id in self._joint_ids]
+        write, feed, counts = writer.write, self._input.feed, self._added
         joint_ids, own_tf = self._joint_ids, self._own_tf
         total = sum(connection.msgcount for connection in wanted) or 1
         for number, (connection, timestamp, data) in enumerate(
@@ -194,7 +229,7 @@ class _Job:
                 self._time = timestamp
                 for topic, message in self._messages(feed(data)):
                     write(added[topic], timestamp, message)
-                    self._added[topic] += 1
+                    counts[topic] += 1
             if progress is not None and number % 1000 == 0:
                 progress(number / total)
 
@@ -202,7 +237,7 @@ class _Job:
         """Refuse a recording of which no joint belongs to any chain."""
         counts = self._input.chain_counts
         if any(count.ready or count.held_back for count in counts) or (
-                self._input.counts - Counter(time_jump=self._input.counts['time_jump'])):
+                self._input.counts.keys() - {'time_jump'}):
             return
         wanted = '; '.join(f'{chain.name} needs {", ".join(chain.joint_names)}'
                            for chain in self._configuration.chains)
@@ -217,111 +252,69 @@ class _Job:
     def summary(self, target: str, took: float) -> Summary:
         """Return what has been done."""
         joint_input = self._input
+        held_back = {chain.name: {
+            reason: (count, ', '.join(f'{joint} {what}' for joint, what in
+                                      counts.joints.get(reason, {}).items()))
+            for reason, count in counts.held_back.items()}
+            for chain, counts in zip(joint_input.chains, joint_input.chain_counts)}
         return Summary(
-            source=str(self._source), target=target, copied=self._copied,
-            added={topic: self._added[topic] for topic, _ in self._topics()},
-            joint_states=joint_input.messages, rejected=dict(joint_input.counts),
-            held_back={chain.name: {
-                reason: (count, ', '.join(
-                    f'{joint} {what}' for joint, what in counts.joints.get(reason, {}).items()))
-                for reason, count in counts.held_back.items()}
-                for chain, counts in zip(joint_input.chains, joint_input.chain_counts)},
-            notes=list(dict.fromkeys(self._notes)),
-            recorded=(self._last - self._first) / 1e9, took=took)
-
-    def _topics(self) -> Iterator[tuple[str, str]]:
-        """Yield topic and type of what is added."""
-        for output in self._outputs:
-            yield output.pose_topic, POSE
-            if self._configuration.publish_twist:
-                yield output.twist_topic, TWIST
-        if self._configuration.publish_tf:
-            yield TF_TOPIC, TF
+            str(self._source), target, self._copied, self._added, joint_input.messages,
+            dict(joint_input.counts), held_back, list(dict.fromkeys(self._notes)),
+            (self._last - self._first) / 1e9, took)
 
     def _messages(self, vectors: Sequence[Ready]) -> list[tuple[str, bytes]]:
         """Return topic and bytes of what a message of joint states has made ready."""
-        messages, poses = [], []
+        made, poses = [], []
         for index, sec, nanosec, q, qdot in vectors:
             output = self._outputs[index]
             pose = output.chain.pose(q)
             poses.append(pose)
-            messages.append((output.pose_topic, output.encode_pose(sec, nanosec, pose)))
+            made.append((output.pose_topic, output.encode_pose(sec, nanosec, pose)))
             if not self._configuration.publish_twist:
                 continue
             if qdot is None:
                 self._input.note_no_velocity(index)
             else:
-                messages.append((output.twist_topic, output.encode_twist(
+                made.append((output.twist_topic, output.encode_twist(
                     sec, nanosec, output.chain.twist(q, qdot))))
         if self._configuration.publish_tf and poses:
-            from icub_leg_fk.ros.cdr import TFMessageEncoder
             encoder = TFMessageEncoder([self._outputs[vector.chain].frames for vector in vectors])
-            messages.append((TF_TOPIC, encoder.encode(sec, nanosec, poses)))
-        return messages
+            made.append((TF_TOPIC, encoder.encode(sec, nanosec, poses)))
+        return made
 
     def _copy(self, writer: Any, connection: Any) -> Any:
         """Add a connection like one of the source."""
         return writer.add_connection(
             connection.topic, connection.msgtype, msgdef=connection.msgdef.data,
-            rihs01=connection.digest or self._hash_of(connection),
-            serialization_format='cdr',
+            rihs01=connection.digest or self._hash_of(connection), serialization_format='cdr',
             offered_qos_profiles=connection.ext.offered_qos_profiles)
 
-    def _add_connections(self, writer: Any, copies: Mapping[int, Any]) -> dict[str, Any]:
-        added = {}
-        for topic, kind in self._topics():
-            there = [copies[connection.id] for connection in self._kept
-                     if (connection.topic, connection.msgtype) == (topic, kind)]
-            added[topic] = there[0] if there else writer.add_connection(
-                topic, kind, typestore=self._store,
-                offered_qos_profiles=[_reliable(100 if topic == TF_TOPIC else 10)])
-        return added
+    def _add(self, writer: Any, topic: str, kind: str, copies: Mapping[int, Any]) -> Any:
+        """Return the connection of what is added: one that is copied, or a new one."""
+        for connection in self._kept:
+            if (connection.topic, connection.msgtype) == (topic, kind):
+                return copies[connection.id]
+        return writer.add_connection(topic, kind, typestore=self._store, offered_qos_profiles=[
+            _reliable(100 if topic == TF_TOPIC else 10)])
 
     def _hash_of(self, connection: Any) -> str:
         """Return the type hash that a recording does not hold, from the definition."""
-        from rosbags.typesys import get_types_from_idl, get_types_from_msg
-
         try:
             store, text = self._store, connection.msgdef.data
             if text:
-                types = (get_types_from_idl(text) if text.startswith('=' * 80 + '\nIDL: ')
-                         else get_types_from_msg(text, connection.msgtype))
-                from rosbags.typesys import get_typestore, Stores
-                store = get_typestore(Stores.EMPTY)
-                store.register(types)
+                store = self._typesys.get_typestore(self._typesys.Stores.EMPTY)
+                store.register(self._typesys.get_types_from_idl(text)
+                               if text.startswith('=' * 80 + '\nIDL: ') else
+                               self._typesys.get_types_from_msg(text, connection.msgtype))
             return str(store.hash_rihs01(connection.msgtype))
         except Exception:  # noqa: BLE001 (whatever a strange definition makes of it)
             self._notes.append(f'the type hash of {connection.msgtype} is not known; '
                                f'{_UNKNOWN_HASH[:9]}... stands for it')
             return _UNKNOWN_HASH
 
-    def _look_for_old_poses(self, replace_poses: bool) -> None:
-        """Refuse, or leave out, what the recording already has of what is added."""
-        from icub_leg_fk.tools.bag_reading import messages
-
-        topics = dict(self._topics())
-        own_tf = [connection for connection in self._kept if TF_TOPIC in topics
-                  and (connection.topic, connection.msgtype) == (TF_TOPIC, TF)]
-        topics.pop(TF_TOPIC, None)
-        mine = [connection for connection in self._kept if connection.topic in topics]
-        found = [connection.topic for connection in mine]
-        if own_tf:
-            frames = [output.frames[1].encode() + b'\0' for output in self._outputs]
-            if any(frame in data for _, _, data in messages(self._reader, self._source, own_tf)
-                   for frame in frames):
-                found.append(f'{TF_TOPIC} with '
-                             f'{", ".join(output.frames[1] for output in self._outputs)}')
-                self._own_tf = frozenset(connection.id for connection in own_tf)
-        if found and not replace_poses:
-            raise InputFileError(f'{self._source}: has {", ".join(found)} already; '
-                                 '--replace-poses leaves these out, --only-poses writes the new '
-                                 'ones alone')
-        self._kept = [connection for connection in self._kept if connection not in mine]
-        self._notes += [f'left out: {topic} of the recording' for topic in found]
-
     def _without_own_transforms(self, data: bytes) -> bytes | None:
         """Return a TFMessage without the frames that are added; None if nothing is left of it."""
-        message: Any = self._store.deserialize_cdr(data, TF)
+        message = self._store.deserialize_cdr(data, TF)
         children = {output.frames[1] for output in self._outputs}
         kept = [transform for transform in message.transforms
                 if transform.child_frame_id not in children]
@@ -342,32 +335,6 @@ def _reliable(depth: int) -> Any:
         forever, False)
 
 
-class _ChainOutput:
-    """What one chain's joint vectors become."""
-
-    def __init__(self, chain: Chain, configuration: Configuration) -> None:
-        from icub_leg_fk.ros.cdr import PoseStampedEncoder, TwistStampedEncoder
-
-        prefix = configuration.frame_prefix
-        self.chain = chain
-        self.pose_topic, self.twist_topic = f'{NODE}/{chain.tip}/pose', f'{NODE}/{chain.tip}/twist'
-        self.frames = prefix + chain.root_frame, prefix + chain.tip_frame
-        self.encode_pose = PoseStampedEncoder(self.frames[0]).encode
-        self.encode_twist = TwistStampedEncoder(self.frames[0]).encode
-
-
-def _configuration(parameters: dict[str, Any], kinematics_file: str | None) -> Configuration:
-    """Return what the node's parameters of the same meaning would amount to."""
-    from icub_leg_fk.kinematics import Catalog
-    from icub_leg_fk.ros.configuration import Configuration
-
-    catalog = Catalog.load(kinematics_file)
-    try:
-        return Configuration.from_parameters(parameters, catalog)
-    except LegFKError as error:
-        raise LegFKError(_as_options(str(error))) from error
-
-
 def _as_options(text: str) -> str:
     """Return a text on parameters of the node as one on options of the command."""
     text = re.sub(r'^parameter (\w+)\.version', r'--chain-version \1', text)
@@ -375,24 +342,22 @@ def _as_options(text: str) -> str:
     return re.sub(r'\(or set (\w+)\.version\)', r'(or --chain-version \1=VERSION)', text)
 
 
-def _check_apart(source: Path, target: Path) -> None:
-    """Refuse to write a bag into, over or around the one that is read."""
+def _checked(source: Path, target: Path, storage: str) -> str:
+    """Return the storage that is asked for, if any; refuse a target that cannot be.
+
+    A recording is not written into, over or around the one that is read.
+    """
     here, there = source.resolve(), target.resolve()
     if here == there or here in there.parents or there in here.parents:
         raise OutputFileError(f'{target}: is the input itself, or a part of it or what it is in; '
                               'allowed: another place')
-
-
-def _storage(target: Path, asked: str) -> str:
-    """Return the storage that the target's name or an option asks for; empty if neither."""
     named = STORAGES.get(target.suffix, '')
-    if named and asked not in ('', named):
-        raise OutputFileError(f'{target}: is a name for {named}, and --storage is {asked}; '
+    if named and storage not in ('', named):
+        raise OutputFileError(f'{target}: is a name for {named}, and --storage is {storage}; '
                               'allowed: one that agrees, or a name without such an ending')
-    return named or asked
+    return named or storage
 
 
-def _has_mcap(bag: Path) -> bool:
-    if not bag.is_dir():
-        return bag.suffix == '.mcap'
-    return any('.mcap' in entry.suffixes for entry in bag.iterdir())
+def _storage_of(bag: Path) -> str:
+    files = bag.iterdir() if bag.is_dir() else (bag,)
+    return 'mcap' if any('.mcap' in file.suffixes for file in files) else 'sqlite3'

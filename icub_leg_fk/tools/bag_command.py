@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import as_completed, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import active_children, get_context
 import os
 from pathlib import Path
+import signal
 import sys
 from typing import Any
 
 from icub_leg_fk.errors import LegFKError, OutputFileError
+from icub_leg_fk.tools import options
 from icub_leg_fk.tools.bag import add_foot_poses, STORAGES, Summary
-from icub_leg_fk.tools.chain_arguments import (
-    add_chain_version,
-    add_kinematics_file,
-    DEFAULT_VERSION,
-    own_versions,
-)
+from icub_leg_fk.tools.signals import stop_on_signals
+from icub_leg_fk.tools.text import columns, indented
 
-HELP = 'copy a bag and add the poses of the feet, as the node would have published them'
 EXAMPLES = """\
 Reads rosbag2 bags by rosbags: mcap and sqlite3, split and compressed ones too, directories or
 single files. Copies every topic as it is and adds /foot_pose_publisher/<tip>/pose behind each
@@ -50,50 +50,43 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         'every bag')
     parser.add_argument('--jobs', metavar='N', type=_positive_integer, default=1,
                         help='bags to work on at a time (default: 1)')
-    parser.add_argument('--force', action='store_true',
-                        help='replace an existing output bag, once the new one is complete')
-    parser.add_argument('--joint-topic', metavar='TOPIC', help='topic of the joint states '
-                        '(default: /joint_states, or the only one there is)')
-    parser.add_argument('--chains', metavar='CHAIN', nargs='+', default=['left_leg', 'right_leg'],
-                        help='chains to add (default: left_leg right_leg)')
-    parser.add_argument('--version', metavar='VERSION', default=DEFAULT_VERSION,
-                        help=f'version of the chains (default: {DEFAULT_VERSION})')
-    add_chain_version(parser)
-    parser.add_argument('--foot-frame', metavar='FRAME', default='dh', help='axes of the feet: '
-                        "dh, the table's last frame (the default), sole, or another of your file")
+    options.add(parser, '--chains', '--version', '--chain-version', '--foot-frame',
+                '--joint-topic', '--kinematics-file', '--force')
+    parser.set_defaults(chains=options.LEGS, version=options.DEFAULT_VERSION, foot_frame='dh')
     parser.add_argument('--frame-prefix', metavar='PREFIX', default='',
                         help='put before every frame id')
     parser.add_argument('--joint-timeout', metavar='S', type=float, default=0.5,
                         help='age of a joint beside the newest of its chain above which there is '
                              'no pose; 0 turns this off (default: 0.5)')
-    parser.add_argument('--twist', action='store_true',
-                        help='also add the velocities of the tips, from the joint velocities')
-    parser.add_argument('--tf', action='store_true', help='also add the poses to /tf')
-    parser.add_argument('--only-poses', action='store_true',
-                        help='leave out everything but what is added')
-    parser.add_argument('--replace-poses', action='store_true',
-                        help='leave out the poses that the bag has already')
     parser.add_argument('--storage', metavar='{mcap,sqlite3}', choices=('mcap', 'sqlite3'),
                         default='',
                         help='storage of the new bag (default: as OUT says, or as in the old one)')
-    add_kinematics_file(parser)
+    for flag, purpose in (
+            ('--twist', 'also add the velocities of the tips, from the joint velocities'),
+            ('--tf', 'also add the poses to /tf'),
+            ('--only-poses', 'leave out everything but what is added'),
+            ('--replace-poses', 'leave out the poses that the bag has already')):
+        parser.add_argument(flag, action='store_true', help=purpose)
 
 
 def run(args: argparse.Namespace) -> int:
     """Convert the bags."""
-    from icub_leg_fk.tools.signals import stop_on_signals
-
     tasks = _tasks(args)
-    options = {name: getattr(args, name) for name in _AS_THEY_ARE}
-    options['chain_versions'] = own_versions(args, args.chains)
+    settings = {name: getattr(args, name) for name in _AS_THEY_ARE}
+    settings['chain_versions'] = options.own_versions(args, args.chains)
     with stop_on_signals():
         if len(tasks) == 1:
-            with _progress() as progress:
-                summary = add_foot_poses(*tasks[0], **options, progress=progress)
+            on_terminal = sys.stderr is not None and sys.stderr.isatty()
+            try:
+                summary = add_foot_poses(*tasks[0], **settings,
+                                         progress=_show_share if on_terminal else None)
+            finally:
+                if on_terminal:
+                    print('\r\033[K', end='', file=sys.stderr, flush=True)
             print('\n'.join(_summary_lines(summary)))
             return 0
         failed = False
-        for (source, _), outcome in _outcomes(tasks, options, args.jobs):
+        for (source, _), outcome in _outcomes(tasks, settings, args.jobs):
             if isinstance(outcome, Summary):
                 print('\n'.join(_summary_lines(outcome)), flush=True)
             else:
@@ -104,23 +97,23 @@ def run(args: argparse.Namespace) -> int:
         return 2 if failed else 0
 
 
-def _outcomes(tasks: Sequence[tuple[Path, Path]], options: Mapping[str, Any], jobs: int
+def _show_share(share: float) -> None:
+    print(f'\r{100 * min(share, 1.0):3.0f} % \033[K', end='', file=sys.stderr, flush=True)
+
+
+def _outcomes(tasks: Sequence[tuple[Path, Path]], settings: Mapping[str, Any], jobs: int
               ) -> Iterator[tuple[tuple[Path, Path], Summary | Exception]]:
     """Yield each task with what came of it, some worked on at a time."""
     if jobs == 1:
         for task in tasks:
             try:
-                yield task, add_foot_poses(*task, **options)
+                yield task, add_foot_poses(*task, **settings)
             except LegFKError as error:
                 yield task, error
         return
-    from concurrent.futures import as_completed, ProcessPoolExecutor
-    from concurrent.futures.process import BrokenProcessPool
-    from multiprocessing import active_children, get_context
-
     pool = ProcessPoolExecutor(min(jobs, len(tasks)), get_context('spawn'), _begin_worker)
     try:
-        futures = {pool.submit(add_foot_poses, *task, **options): task for task in tasks}
+        futures = {pool.submit(add_foot_poses, *task, **settings): task for task in tasks}
         for future in as_completed(futures):
             try:
                 yield futures[future], future.result()
@@ -138,8 +131,6 @@ def _outcomes(tasks: Sequence[tuple[Path, Path]], options: Mapping[str, Any], jo
 
 def _begin_worker() -> None:
     """Let a worker that is told to stop take back what it has begun."""
-    import signal
-
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the command tells its workers itself
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))
 
@@ -179,25 +170,8 @@ def _positive_integer(text: str) -> int:
     return int(text)
 
 
-class _progress:
-    """Shows the share that is done on stderr, if that is a terminal."""
-
-    def __enter__(self) -> Callable[[float], None] | None:
-        self._visible = sys.stderr is not None and sys.stderr.isatty()
-        return self._show if self._visible else None
-
-    def _show(self, share: float) -> None:
-        print(f'\r{100 * min(share, 1.0):3.0f} % \033[K', end='', file=sys.stderr, flush=True)
-
-    def __exit__(self, *_: object) -> None:
-        if self._visible:
-            print('\r\033[K', end='', file=sys.stderr, flush=True)
-
-
 def _summary_lines(summary: Summary) -> list[str]:
     """Return the closing summary, line by line."""
-    from icub_leg_fk.tools.text import columns, indented
-
     rows = [(str(summary.copied), 'messages copied')]
     rows += [(str(count), f'added on {topic}') for topic, count in summary.added.items()]
     rows += [(str(count), 'time steps back: held joints forgotten' if reason == 'time_jump'

@@ -6,8 +6,8 @@ files. What it would pass over, or refuse without a name, is looked at first.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 import os
 from pathlib import Path
 import re
@@ -18,13 +18,6 @@ from typing import Any
 from icub_leg_fk.errors import InputFileError, MissingDependencyError
 import yaml
 
-try:
-    from rosbags.rosbag2 import Reader
-except ImportError as error:
-    raise MissingDependencyError(
-        'rosbags is not installed, and bags need it: pip install "rosbags>=0.11.9,<0.12" (on '
-        'Ubuntu in a virtual environment made with --system-site-packages)') from error
-
 DEFAULT_TOPIC = '/joint_states'
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 METADATA = 'metadata.yaml'
@@ -34,6 +27,17 @@ _CLEAN = re.compile(r'/?(?!/)[A-Za-z0-9._/ +@:,=-]*')  # what also sqlite takes 
 _MEND = {'.mcap': '`mcap recover` may mend it', '.db3': '`ros2 bag reindex` may mend it'}
 
 
+def import_rosbags() -> tuple[Any, Any]:
+    """Return rosbags' modules for bags and for message types."""
+    try:
+        from rosbags import rosbag2, typesys
+    except ImportError as error:
+        raise MissingDependencyError(
+            'rosbags is not installed, and bags need it: pip install "rosbags>=0.11.9,<0.12" (on '
+            'Ubuntu in a virtual environment made with --system-site-packages)') from error
+    return rosbag2, typesys
+
+
 @contextmanager
 def open_bag(path: str | Path) -> Iterator[Any]:
     """Give a rosbags reader of a rosbag2 directory or of one of its files.
@@ -41,26 +45,19 @@ def open_bag(path: str | Path) -> Iterator[Any]:
     Raises:
         InputFileError: there is nothing that can be read; says why, and what mends it.
     """
-    path = Path(path)
+    path, (rosbag2, _) = Path(path), import_rosbags()
     shown = os.fsencode(path).decode(errors='backslashreplace')
-    files = _files(path, shown)
-    for file in files:
-        _check_file(file, shown)
-    if (path / METADATA).is_file():
-        _check_formats(path / METADATA, shown)
+    _look_first(path, shown)
     with tempfile.TemporaryDirectory() as scratch:
         try:
-            reader: Any = Reader(_clean(path, Path(scratch)))
+            reader: Any = rosbag2.Reader(_clean(path, Path(scratch)))
             reader.open()
         except Exception as error:
             raise unreadable(path, error) from error
         try:
-            odd = sorted({f'{connection.topic} ({connection.ext.serialization_format})'
-                          for connection in reader.connections
-                          if connection.ext.serialization_format != 'cdr'})
-            if odd:
-                raise InputFileError(f'{shown}: the messages of {", ".join(odd)} are not CDR; '
-                                     'allowed: recordings of ROS 2, which are')
+            _refuse_other_than_cdr(shown, {
+                connection.topic: connection.ext.serialization_format
+                for connection in reader.connections})
             if not isinstance(reader.storage.metadata.custom or {}, dict) or not all(
                     isinstance(connection.msgcount, int) for connection in reader.connections):
                 raise unreadable(path, ValueError(f'{METADATA} has values of the wrong type'))
@@ -119,42 +116,49 @@ def unreadable(path: str | Path, error: Exception) -> InputFileError:
     return InputFileError(f'{path}: cannot be read: {reason}; {mend}')
 
 
-def _files(path: Path, shown: str) -> list[Path]:
-    """Return the storage files of a recording; refuse what is none."""
+def _look_first(path: Path, shown: str) -> None:
+    """Refuse what is no recording of ROS 2, or not all of one, where rosbags would not say so."""
     if not path.exists():
         raise InputFileError(f'{shown}: there is no such file or directory')
+    files = [path]
     if path.is_dir():
-        return sorted(entry for entry in path.iterdir() if entry.suffix in _MEND)
-    with path.open('rb') as stream:
-        if stream.read(7) == b'#ROSBAG':
-            raise InputFileError(f'{shown}: is a ROS 1 bag; `rosbags-convert` makes a ROS 2 '
-                                 'recording of it')
-    if path.suffix == '.zstd':
-        raise InputFileError(f'{shown}: is a compressed file alone; give its directory, or '
-                             'decompress it: zstd -d')
-    return [path]
+        files = sorted(entry for entry in path.iterdir() if entry.suffix in _MEND)
+    else:
+        with path.open('rb') as stream:
+            if stream.read(7) == b'#ROSBAG':
+                raise InputFileError(f'{shown}: is a ROS 1 bag; `rosbags-convert` makes a ROS 2 '
+                                     'recording of it')
+        if path.suffix == '.zstd':
+            raise InputFileError(f'{shown}: is a compressed file alone; give its directory, or '
+                                 'decompress it: zstd -d')
+    encodings: dict[str, str] = {}
+    for file in files:
+        log = file.with_name(f'{file.name}-wal')
+        if file.suffix == '.db3' and log.is_file() and log.stat().st_size:
+            raise InputFileError(f'{shown}: {log.name} holds messages that are not in {file.name} '
+                                 'yet; this brings them in: sqlite3 '
+                                 f"{file.name} 'PRAGMA wal_checkpoint(TRUNCATE)'")
+        # Of damaged files rosbags will say what is wrong.
+        with suppress(OSError, struct.error, UnicodeDecodeError, IndexError):
+            profile, found = _mcap_summary(file) if file.suffix == '.mcap' else ('', {})
+            if 'ros1' in (profile, *found.values()):
+                raise InputFileError(f'{shown}: is an MCAP file of ROS 1 messages; allowed: of '
+                                     'ROS 2')
+            encodings |= found
+    with suppress(Exception):
+        bag = yaml.safe_load((path / METADATA).read_text(encoding='utf-8'))
+        for topic in bag['rosbag2_bagfile_information']['topics_with_message_count']:
+            about = topic['topic_metadata']
+            encodings[about['name']] = about['serialization_format']
+    _refuse_other_than_cdr(shown, encodings)
 
 
-def _check_file(file: Path, shown: str) -> None:
-    """Refuse a storage file of messages that are not of ROS 2, or with some in a log beside it."""
-    log = file.with_name(f'{file.name}-wal')
-    if file.suffix == '.db3' and log.is_file() and log.stat().st_size:
-        raise InputFileError(f'{shown}: {log.name} holds messages that are not in {file.name} '
-                             'yet; this brings them in: sqlite3 '
-                             f"{file.name} 'PRAGMA wal_checkpoint(TRUNCATE)'")
-    if file.suffix != '.mcap':
-        return
-    try:
-        profile, encodings = _mcap_summary(file)
-    except (OSError, struct.error, UnicodeDecodeError, IndexError):
-        return  # rosbags will say what is wrong
-    odd = sorted(f'{topic} ({encoding})' for topic, encoding in encodings.items()
-                 if encoding != 'cdr')
-    if profile == 'ros1' or 'ros1' in encodings.values():
-        raise InputFileError(f'{shown}: is an MCAP file of ROS 1 messages; allowed: of ROS 2')
-    if odd:
-        raise InputFileError(f'{shown}: is an MCAP file with messages that are not CDR: '
-                             f'{", ".join(odd)}; allowed: recordings of ROS 2, which are')
+def _refuse_other_than_cdr(shown: str, encodings: Mapping[str, str]) -> None:
+    """Refuse a recording that has other encodings, which are given by topic, than ROS 2's."""
+    if odd := sorted(f'{topic} ({encoding})' for topic, encoding in encodings.items()
+                     if encoding != 'cdr'):
+        raise InputFileError(f'{shown}: the messages of {", ".join(odd)} are not CDR; allowed: '
+                             'recordings of ROS 2, which are')
 
 
 def _mcap_summary(file: Path) -> tuple[str, dict[str, str]]:
@@ -186,22 +190,6 @@ def _mcap_summary(file: Path) -> tuple[str, dict[str, str]]:
 def _string(data: bytes, at: int) -> tuple[str, int]:
     size, = struct.unpack_from('<I', data, at)
     return data[at + 4:at + 4 + size].decode(), at + 4 + size
-
-
-def _check_formats(metadata: Path, shown: str) -> None:
-    """Refuse topics that are not CDR by their names, which rosbags does not tell."""
-    try:
-        topics = yaml.safe_load(metadata.read_text(encoding='utf-8'))[
-            'rosbag2_bagfile_information']['topics_with_message_count']
-        odd = {topic['topic_metadata']['name']: topic['topic_metadata']['serialization_format']
-               for topic in topics}
-        odd = {topic: kind for topic, kind in odd.items() if kind != 'cdr'}
-    except Exception:  # noqa: BLE001 (rosbags will say what is wrong)
-        return
-    if odd:
-        listed = ', '.join(f'{topic} ({kind})' for topic, kind in odd.items())
-        raise InputFileError(f'{shown}: the messages of {listed} are not CDR; allowed: recordings '
-                             'of ROS 2, which are')
 
 
 def _clean(path: Path, scratch: Path) -> Path:

@@ -6,16 +6,14 @@ import argparse
 from collections.abc import Sequence
 from itertools import permutations, product
 import math
-from typing import Any, NamedTuple, TYPE_CHECKING
+from typing import Any, NamedTuple
 
 from icub_leg_fk.errors import InputFileError
-from icub_leg_fk.tools.chain_arguments import add_json, add_kinematics_file, load_catalog
+from icub_leg_fk.kinematics import Chain, matrix_to_quaternion, Urdf
+from icub_leg_fk.kinematics.rotation import angle_between, Array, turns_about
+from icub_leg_fk.tools import options, text
+import numpy as np
 
-if TYPE_CHECKING:
-    from icub_leg_fk.kinematics import Chain, Urdf
-    from icub_leg_fk.kinematics.rotation import Array
-
-HELP = 'compare a robot, given by its URDF, with the versions of the tables'
 EXAMPLES = """\
 For each chain and version whose joints and frames the URDF has: how far the table's tip is from
 the robot's frame of that name, at random joint positions within +-1.2 rad. "Fitted" is what is
@@ -59,16 +57,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('urdf', metavar='ROBOT.urdf', help='the URDF of the robot')
     parser.add_argument('--chains', metavar='CHAIN', nargs='+',
                         help='chains to compare (default: all whose joints the robot has)')
-    add_kinematics_file(parser)
-    add_json(parser)
+    options.add(parser, '--kinematics-file', '--json')
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the comparison."""
-    from icub_leg_fk.kinematics import Urdf
-    from icub_leg_fk.tools.text import columns, json_text
-
-    catalog, urdf = load_catalog(args), Urdf.load(args.urdf)
+    catalog, urdf = options.load_catalog(args), Urdf.load(args.urdf)
     for name in args.chains or ():
         catalog.entry(name)
     names = args.chains or list(catalog.chains)
@@ -84,12 +78,12 @@ def run(args: argparse.Namespace) -> int:
     advice = [_advice(_nearest(found, name), args.urdf) for name in dict.fromkeys(
         row.chain for row in found)]
     if args.json:
-        print(json_text({'urdf': args.urdf, 'robot': urdf.name, 'advice': advice,
-                         'differences': [_as_json(row) for row in found]}))
+        print(text.as_json({'urdf': args.urdf, 'robot': urdf.name, 'advice': advice,
+                            'differences': [_as_json(row) for row in found]}))
         return 0
     print(f'{args.urdf} ({urdf.name}) beside the tables of {catalog.file}')
     print(f'{_SAMPLES} postures within +-{_REACH} rad; largest (mean) difference\n')
-    print('\n'.join(columns([_cells(row) for row in found], header=(
+    print('\n'.join(text.columns([_cells(row) for row in found], header=(
         'chain', 'version', 'frame', 'mm', 'deg', 'fitted mm', 'fitted deg', ''))))
     print()
     print('\n'.join(advice))
@@ -98,8 +92,6 @@ def run(args: argparse.Namespace) -> int:
 
 def difference(chain: Chain, urdf: Urdf) -> Difference:
     """Return how far a chain's tip is from the robot's frame of that name."""
-    import numpy as np
-
     Q = np.random.default_rng(2955).uniform(-_REACH, _REACH, (_SAMPLES, chain.n))
     ours = chain.forward(Q)
     robot = urdf.forward(chain.root_frame, chain.tip_frame,
@@ -130,9 +122,6 @@ def _nearest(rows: Sequence[Difference], chain: str) -> Difference:
 
 def _distance(one: Array, two: Array) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return largest and mean distance [mm] and angle [deg] between transforms."""
-    from icub_leg_fk.kinematics.rotation import angle_between
-    import numpy as np
-
     off = 1000 * np.linalg.norm(one[:, :3, 3] - two[:, :3, 3], axis=1)
     angle = np.degrees(angle_between(one[:, :3, :3], two[:, :3, :3]))
     return ((float(off.max()), float(off.mean())), (float(angle.max()), float(angle.mean())))
@@ -140,9 +129,6 @@ def _distance(one: Array, two: Array) -> tuple[tuple[float, float], tuple[float,
 
 def _turn_of_axes(ours: Array, robot: Array) -> tuple[Array, str]:
     """Return the turn by right angles that brings the tip's axes nearest, and its words."""
-    from icub_leg_fk.kinematics.rotation import matrix_to_quaternion
-    import numpy as np
-
     mean = (np.swapaxes(ours[:, :3, :3], 1, 2) @ robot[:, :3, :3]).mean(axis=0)
     signed = (np.eye(3)[list(order)] * signs for order in permutations(range(3))
               for signs in product((1, -1), repeat=3))
@@ -163,8 +149,6 @@ def _fitted(ours: Array, robot: Array) -> Array:
     Gauss-Newton on both transforms, least squares by numpy; singular directions (a constant that
     a joint can make up for) stay as they are.
     """
-    import numpy as np
-
     X, Y = np.eye(4), np.eye(4)
     best, least = ours, math.inf
     for _ in range(20):
@@ -189,17 +173,12 @@ def _fitted(ours: Array, robot: Array) -> Array:
 
 def _error(T: Array, robot: Array) -> Array:
     """Return the (N, 6) differences: positions [m], and small angles times an arm's length."""
-    import numpy as np
-
     turn = np.cross(T[:, :3, :3], robot[:, :3, :3], axis=1).sum(axis=2) / 2
     return np.hstack((T[:, :3, 3] - robot[:, :3, 3], _ARM * turn))
 
 
 def _small(step: Array) -> Array:
     """Return the transform of a translation and a rotation vector."""
-    from icub_leg_fk.kinematics.rotation import turns_about
-    import numpy as np
-
     angle = float(np.linalg.norm(step[3:]))
     T = np.eye(4)
     T[:3, 3] = step[:3]

@@ -35,21 +35,13 @@ class DemoError(LegFKError):
 
 @dataclass
 class Answers:
-    """The poses of one tip.
-
-    Attributes:
-        tip: name of the tip.
-        poses: (N, 7) rows x, y, z [m], qx, qy, qz, qw by message; NaN where none has come.
-        latencies: (N,) from publishing the message to receiving the pose [s]; NaN likewise.
-        unexpected: poses received that belong to no message, or to one that had a pose.
-        newest: index of the message whose pose came last, or -1.
-    """
+    """The poses of one tip, by message; NaN where none has come."""
 
     tip: str
-    poses: Array
-    latencies: Array
-    unexpected: int = 0
-    newest: int = -1
+    poses: Array  # (N, 7) rows x, y, z [m], qx, qy, qz, qw
+    latencies: Array  # (N,) from publishing the message to receiving the pose [s]
+    unexpected: int = 0  # poses that belong to no message, or to one that had a pose
+    newest: int = 0  # index of the message whose pose came last
 
     @property
     def arrived(self) -> int:
@@ -75,9 +67,9 @@ def running_node(namespace: str, parameters: dict[str, str]) -> Iterator[Callabl
 
     Gives what raises `DemoError` once the node has stopped by itself.
     """
-    words = ['--ros-args', '-r', f'__ns:={namespace}']
-    for name, value in parameters.items():
-        words += ['-p', f'{name}:={value}']
+    words = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
+    command = [sys.executable, '-m', 'icub_leg_fk.ros.main', '--ros-args', '-r',
+               f'__ns:={namespace}', *words]
     process: subprocess.Popen[bytes] | None = None
 
     def check() -> None:
@@ -91,9 +83,8 @@ def running_node(namespace: str, parameters: dict[str, str]) -> Iterator[Callabl
         try:
             with held_signals():  # the node must not get away between its start and the next line
                 # A session of its own: Ctrl-C reaches the demonstration, which stops the node.
-                process = subprocess.Popen(
-                    [sys.executable, '-m', 'icub_leg_fk.ros.main', *words],
-                    stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True)
+                process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log,
+                                           stderr=log, start_new_session=True)
             yield check
         finally:
             with held_signals():
@@ -109,17 +100,16 @@ def running_node(namespace: str, parameters: dict[str, str]) -> Iterator[Callabl
 class Replay:
     """Publishes joint states in their own timing and collects poses; use as a context manager.
 
-    `answers` has what has come, per tip, and `stamps` those of the messages published [ns].
+    `answers` has what has come, per tip, and `sent` stamp [ns] and bytes of what was published.
     """
 
     def __init__(self, recording: JointRecording, namespace: str, tips: tuple[str, ...]) -> None:
-        self._recording = recording
-        self._namespace = namespace
+        self._recording, self._namespace = recording, namespace
         count = len(recording.times)
         self.answers = [Answers(tip, np.full((count, 7), np.nan), np.full(count, np.nan))
                         for tip in tips]
-        self.stamps: list[int] = []
-        self._sent: dict[int, tuple[int, float]] = {}  # by stamp [ns]: which message, and when
+        self.sent: list[tuple[int, bytes]] = []
+        self._awaited: dict[int, tuple[int, float]] = {}  # by stamp: which message, sent when
         self._found: set[str] = set()
 
     def __enter__(self) -> Replay:
@@ -145,7 +135,6 @@ class Replay:
             raise DemoError(f'ROS 2 cannot be started: {" ".join(str(error).split())}') from error
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
-        self._joint_state = JointState
         self._publisher = self._node.create_publisher(JointState, 'joint_states', DEPTH)
         for answers in self.answers:
             self._node.create_subscription(
@@ -195,9 +184,10 @@ class Replay:
                     on_time(now - start)
                 # A negative timeout would be none.
                 self._spin(max(min(start + offset, next_call) - now, 0.0))
-            before = next(reversed(self._sent), 0)
-            self.stamps.append(max(start_ns + round(offset * 1e9), before + 1))
-            self._publish(self.stamps[-1], index)
+            stamp = start_ns + round(offset * 1e9)
+            if self.sent:
+                stamp = max(stamp, self.sent[-1][0] + 1)
+            self.sent.append((stamp, self._publish(stamp, index)))
         wanted = len(times) * len(self.answers)
         arrived, deadline = -1, 0.0
         while (arrived_now := sum(answers.arrived for answers in self.answers)) < wanted:
@@ -217,7 +207,7 @@ class Replay:
     def _take(self, answers: Answers, message: Any) -> None:
         now = time.monotonic()
         stamp = message.header.stamp
-        index, sent = self._sent.get(stamp.sec * 1_000_000_000 + stamp.nanosec, (None, now))
+        index, sent = self._awaited.get(stamp.sec * 1_000_000_000 + stamp.nanosec, (None, now))
         if index == _PROBE:
             self._found.add(answers.tip)
         elif index is None or not np.isnan(answers.latencies[index]):
@@ -228,11 +218,15 @@ class Replay:
             answers.latencies[index] = now - sent
             answers.newest = index
 
-    def _publish(self, stamp: int, index: int) -> None:
-        message = self._joint_state()
+    def _publish(self, stamp: int, index: int) -> bytes:
+        from rclpy.serialization import serialize_message
+        from sensor_msgs.msg import JointState
+
+        message = JointState(name=list(self._recording.joint_names),
+                             position=self._recording.positions[max(index, 0)].tolist())
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
-        message.name = list(self._recording.joint_names)
-        message.position = self._recording.positions[max(index, 0)].tolist()
-        self._sent[stamp] = index, time.monotonic()
+        data = bytes(serialize_message(message))
+        self._awaited[stamp] = index, time.monotonic()
         with held_signals():
-            self._publisher.publish(message)
+            self._publisher.publish(data)
+        return data

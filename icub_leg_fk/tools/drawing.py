@@ -54,9 +54,7 @@ _SETTINGS = {
 @contextmanager
 def _plain_matplotlib() -> Iterator[None]:
     """Let matplotlib be imported and used with its own defaults and this module's settings."""
-    plain = {'MPLBACKEND': 'agg', 'MATPLOTLIBRC': os.devnull}
-    before = {name: os.environ.get(name) for name in plain}
-    os.environ.update(plain)
+    os.environ |= {'MPLBACKEND': 'agg', 'MATPLOTLIBRC': os.devnull}
     logging.getLogger('matplotlib').setLevel(logging.CRITICAL)  # what it says of a matplotlibrc
     try:
         from matplotlib import rc_context, rcdefaults, rcParams
@@ -67,12 +65,6 @@ def _plain_matplotlib() -> Iterator[None]:
     except ValueError as error:  # a matplotlibrc in the working directory that is not text
         raise LegFKError(f'matplotlib cannot be imported: {error}; is there a file matplotlibrc '
                          'in this directory?') from error
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
     with rc_context():
         rcdefaults()
         rcParams.update(_SETTINGS)  # type: ignore[arg-type]

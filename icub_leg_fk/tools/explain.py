@@ -4,19 +4,12 @@ from __future__ import annotations
 
 import argparse
 import math
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
-from icub_leg_fk.tools.chain_arguments import (
-    add_chain,
-    add_joint_positions,
-    joint_positions,
-    load_chain,
-)
+from icub_leg_fk.tools import options, text
+from icub_leg_fk.tools.explain_document import as_latex, as_text
+from icub_leg_fk.tools.explain_steps import Cell, Explanation, Matrix, Step, work_out
 
-if TYPE_CHECKING:
-    from icub_leg_fk.tools.explain_steps import Cell, Explanation, Matrix, Step
-
-HELP = 'explain a chain: DH table, each A_i, products, answer'
 EXAMPLES = """\
 Without joint positions the answer is a formula in q_i. Lengths are mm, as in printed tables.
 
@@ -29,28 +22,23 @@ examples:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    add_chain(parser)
-    add_joint_positions(parser, required=False)
+    options.add(parser, 'chain', '--version', '--foot-frame', '--kinematics-file')
+    options.add_joint_positions(parser, required=False)
     parser.add_argument('--symbolic', action='store_true',
                         help='exact numbers instead of decimals: pi/2, not 1.5708 (needs sympy, '
                              'as do symbols)')
     form = parser.add_mutually_exclusive_group()
     form.add_argument('--latex', action='store_true', help='print a LaTeX document')
-    form.add_argument('--json', action='store_true', help='print JSON, for programs')
+    options.add(form, '--json')
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the explanation."""
-    from icub_leg_fk.tools.explain_document import document, Latex, Text
-    from icub_leg_fk.tools.explain_steps import work_out
-    from icub_leg_fk.tools.text import json_text
-
-    catalog, chain = load_chain(args)
-    q = joint_positions(args, chain)
+    catalog, chain = options.load_chain(args)
     version = catalog.entry(chain.name).versions[chain.version]
-    e = work_out(version, chain, args.foot_frame, q, args.symbolic)
-    print(json_text(_as_json(e)) if args.json
-          else document(e, Latex(e) if args.latex else Text(e)))
+    e = work_out(version, chain, args.foot_frame, options.joint_positions(args, chain),
+                 args.symbolic)
+    print(text.as_json(_as_json(e)) if args.json else as_latex(e) if args.latex else as_text(e))
     return 0
 
 
@@ -58,20 +46,16 @@ def _as_json(e: Explanation) -> dict[str, Any]:
     """Return the explanation for programs; lengths in mm, angles in rad."""
     chain = e.chain
     return {
-        'chain': chain.name,
-        'version': chain.version,
-        'source': e.source,
-        'root_frame': chain.root_frame,
-        'tip_frame': chain.tip_frame,
-        'units': {'length': 'mm', 'angle': 'rad'},
-        'convention': chain.convention,
+        'chain': chain.name, 'version': chain.version, 'source': e.source,
+        'root_frame': chain.root_frame, 'tip_frame': chain.tip_frame,
+        'units': {'length': 'mm', 'angle': 'rad'}, 'convention': chain.convention,
         'joints': list(chain.joint_names),
         'joint_positions': None if e.q is None else [
             1000 * value if link.is_prismatic else value
             for value, link in zip(e.q, chain.joints, strict=True)],
         'symbols': {name: str(meaning) for name, meaning in e.symbols.items()},
-        'frames': [{'origin': T[:3, 3].tolist(), 'x': T[:3, 0].tolist(), 'y': T[:3, 1].tolist(),
-                    'z': T[:3, 2].tolist()} for T in (frame + 0.0 for frame in e.frames.values())],
+        'frames': [{name: (T[:3, column] + 0.0).tolist() for column, name in enumerate(
+            ('x', 'y', 'z', 'origin'))} for T in e.frames.values()],
         'frame_names': list(e.frames),
         'links': [_link(step, e.is_modified) for step in e.steps],
         'running_products': [_matrix(step.T_0) for step in e.steps],
@@ -83,14 +67,12 @@ def _as_json(e: Explanation) -> dict[str, Any]:
 
 def _link(step: Step, modified: bool) -> dict[str, Any]:
     link = step.link
-    lower, upper = link.limits
     scale = 1000 if link.is_prismatic else 1
     names = ('Rx', 'tx', 'Rz', 'tz') if modified else ('Rz', 'tz', 'tx', 'Rx')
     return {
-        'i': step.index,
-        'joint': step.joint or None,
-        'joint_type': link.joint_type,
-        'range': [scale * lower, scale * upper] if math.isfinite(lower) else None,
+        'i': step.index, 'joint': step.joint or None, 'joint_type': link.joint_type,
+        'range': [scale * limit for limit in link.limits] if math.isfinite(link.limits[0])
+        else None,
         'erratum': link.erratum,
         'theta': _cell(step.theta), 'd': _cell(step.d), 'a': _cell(step.a),
         'alpha': _cell(step.alpha),
@@ -99,11 +81,10 @@ def _link(step: Step, modified: bool) -> dict[str, Any]:
     }
 
 
-def _matrix(T: Matrix) -> list[list[float]] | list[list[str]]:
+def _matrix(T: Matrix) -> list[list[float | str]]:
     """Return a matrix of numbers, or one of expressions if any entry is one."""
-    if all(isinstance(cell, (int, float)) for row in T for cell in row):
-        return [[float(cell) + 0.0 for cell in row] for row in T]
-    return [[str(cell) for cell in row] for row in T]
+    exact = any(isinstance(_cell(cell), str) for row in T for cell in row)
+    return [[str(cell) if exact else float(cell) + 0.0 for cell in row] for row in T]
 
 
 def _cell(cell: Cell) -> float | str:

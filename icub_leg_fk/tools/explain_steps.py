@@ -14,8 +14,9 @@ s_34, or c_3m4 and s_3m4 for a difference.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import reduce
 import math
 from typing import Any
 
@@ -52,32 +53,18 @@ class Step:
 
 @dataclass(frozen=True)
 class Explanation:
-    """One chain explained.
-
-    Attributes:
-        chain: the chain.
-        tip: symbol of its tip, as in T_RoLf.
-        source: where the table comes from, if it is not the printed documentation.
-        q: the joint vector [rad or m]; None where the joints stay symbols.
-        T_root_0: where frame 0 stands in the root frame.
-        steps: one per row.
-        tips: what follows the last row: name and matrix of T_nIs and of the sole.
-        T_root_tip: the answer.
-        symbols: what each symbol stands for; empty with numbers.
-        frames: frames in the root frame [mm] by name, 0 to m and those of the tips, for q or for
-            q = 0.
-    """
+    """One chain explained."""
 
     chain: Chain
-    tip: str
-    source: str
-    q: Sequence[float] | None
+    tip: str  # its symbol, as in T_RoLf
+    source: str  # of the table, if it is not the printed documentation
+    q: Sequence[float] | None  # [rad or m]; None where the joints stay symbols
     T_root_0: Matrix
     steps: list[Step]
-    tips: list[tuple[str, Matrix]]
+    tips: list[tuple[str, Matrix]]  # what follows the last row: T_nIs, and that of the sole
     T_root_tip: Matrix
-    frames: dict[str, Array]
-    symbols: dict[str, Cell] = field(default_factory=dict)
+    frames: dict[str, Array]  # by name, 0 to m and the tips', in the root frame, for q or q = 0
+    symbols: dict[str, Cell]  # what each symbol stands for; empty with numbers
 
     @property
     def is_modified(self) -> bool:
@@ -159,15 +146,14 @@ class Algebra:
         """Return T_01, T_02, ... T_0m, with the angles of joints on parallel axes added up."""
         zero, one = self.number(0.0), self.number(1.0)
         products: list[Matrix] = []
-        base: Matrix | None = None
+        base = _constant(np.eye(4), self)
         turned: list[tuple[int, int]] = []  # joints since base, and the sense of each
         x, y, z, sense = zero, zero, zero, 1  # translation since base; -1 once z points back
 
         def behind(ca: Cell, sa: Cell) -> Matrix:
             c, s = self._cos_sin_sum(turned)
-            within = [[c, -s * ca, s * sa, x], [s, c * ca, -c * sa, y], [zero, sa, ca, z],
-                      [0, 0, 0, 1]]
-            T = within if base is None else product(base, within)
+            T = product(base, [[c, -s * ca, s * sa, x], [s, c * ca, -c * sa, y],
+                               [zero, sa, ca, z], [0, 0, 0, 1]])
             return [[self._sympy.expand(cell) for cell in row] for row in T] if self._sympy else T
 
         for step in steps:
@@ -184,8 +170,7 @@ class Algebra:
                 else:
                     base, turned = behind(ca, sa), []
                     x, y, z, sense = zero, zero, zero, 1
-            products.append(base if base is not None and not turned and not (x or y or z)
-                            and sense == 1 else behind(sense * one, zero))
+            products.append(behind(sense * one, zero))
         return products
 
     def _cos_sin_sum(self, turned: Sequence[tuple[int, int]]) -> tuple[Cell, Cell]:
@@ -230,33 +215,29 @@ def work_out(version: ChainVersion, chain: Chain, foot_frame: str | None,
     if not np.array_equal(T_dh_tip, np.eye(4)):
         tips.append((f'T_{tip}{sole}', T_dh_tip))
         tip = sole
-    T: Array = np.array(_matrix(chain.T_root_0, decimals))
+    T: Array = np.array(_constant(chain.T_root_0, decimals))
     frames = {'0': T}
     for step in _steps(chain, [0.0] * chain.n if q is None else q, decimals):
         T = frames[str(step.index + 1)] = T @ np.array(step.A)
     for name, placed in tips:
-        T = frames[name[3:]] = T @ np.array(_matrix(placed, decimals))
-    exact_tips = [(name, _matrix(placed, algebra)) for name, placed in tips]
-    T_root_0 = _matrix(chain.T_root_0, algebra)
-    T_root_tip = product(T_root_0, steps[-1].T_0)
-    for _, matrix in exact_tips:
-        T_root_tip = product(T_root_tip, matrix)
+        T = frames[name[3:]] = T @ np.array(_constant(placed, decimals))
+    T_root_0 = _constant(chain.T_root_0, algebra)
+    exact_tips = [(name, _constant(placed, algebra)) for name, placed in tips]
+    T_root_tip = product(T_root_0, steps[-1].T_0, *(placed for _, placed in exact_tips))
     return Explanation(chain, tip, version.source, q, T_root_0, steps, exact_tips, T_root_tip,
                        frames, algebra.symbols)
 
 
-def product(A: Matrix, B: Matrix) -> Matrix:
-    """Return the product of two 4x4 matrices of numbers or expressions."""
-    return [[sum((x * y for x, y in zip(row, column, strict=True)), start=0)
-             for column in zip(*B, strict=True)] for row in A]
+def product(*matrices: Matrix) -> Matrix:
+    """Return the product of 4x4 matrices of numbers or expressions."""
+    return reduce(lambda A, B: [[sum((x * y for x, y in zip(row, column)), start=0)
+                                 for column in zip(*B)] for row in A], matrices)
 
 
-def _matrix(T: Array, algebra: Algebra) -> Matrix:
+def _constant(T: Array, algebra: Algebra) -> Matrix:
     """Return a constant transform, whose translation is in metres, in mm."""
-    rows = [[algebra.number(value) for value in row] for row in T.tolist()]
-    for row, metres in zip(rows, T[:3, 3].tolist()):
-        row[3] = algebra.mm(metres)
-    return rows
+    return [[*map(algebra.number, row[:3]), algebra.mm(row[3])]
+            for row in T[:3].tolist()] + [[0, 0, 0, 1]]
 
 
 def _steps(chain: Chain, q: Sequence[float] | None, algebra: Algebra) -> list[Step]:
@@ -276,7 +257,7 @@ def _steps(chain: Chain, q: Sequence[float] | None, algebra: Algebra) -> list[St
             [[1, 0, 0, 0], [0, ca, -sa, 0], [0, sa, ca, 0], [0, 0, 0, 1]])
         if modified:
             factors = (factors[3], factors[2], factors[0], factors[1])
-        A = product(product(*factors[:2]), product(*factors[2:]))
+        A = product(*factors)
         steps.append(Step(i, joint, link, theta, d, a, alpha, factors, A, A))
     products = algebra.running_products(steps, modified)
     return [replace(step, T_0=T) for step, T in zip(steps, products, strict=True)]

@@ -1,9 +1,8 @@
 # PYTHON_ARGCOMPLETE_OK
 """The `leg_fk` command: one subcommand per module of this package.
 
-A subcommand's module has `HELP` (one line), `EXAMPLES`, `add_arguments(parser)` and `run(args)`,
-and imports what is heavy (numpy too) only inside functions: `leg_fk -h` reads all of them, a
-command only its own.
+A subcommand's module has `EXAMPLES`, `add_arguments(parser)` and `run(args)`. Only that of the
+subcommand asked for is imported; what is optional or heavy it imports inside functions.
 """
 
 from __future__ import annotations
@@ -20,16 +19,20 @@ from typing import Any, NoReturn
 from icub_leg_fk import __version__
 from icub_leg_fk.errors import LegFKError, near, UnknownNameError
 
-MODULES = {
-    'list': 'list_chains',
-    'pose': 'pose',
-    'explain': 'explain',
-    'bag': 'bag_command',
-    'plot': 'plot',
-    'table': 'table',
-    'compare': 'compare',
-    'urdf': 'urdf',
-    'demo': 'demo',
+COMMANDS = {  # module, and what it is for
+    'list': ('list_chains', 'list the chains: versions, joints, tip frames'),
+    'pose': ('pose', 'the pose of a foot, or any tip, for one joint vector'),
+    'explain': ('explain', 'explain a chain: DH table, each A_i, products, answer'),
+    'bag': ('bag_command', 'copy a bag and add the poses of the feet, as the node would have '
+                           'published them'),
+    'plot': ('plot', 'a picture of the feet over time and of the legs in space, from a bag or a '
+                     'CSV file'),
+    'table': ('table', 'make the DH table of any robot from its URDF, as a kinematics file for '
+                       'every command'),
+    'compare': ('compare', 'compare a robot, given by its URDF, with the versions of the tables'),
+    'urdf': ('urdf', 'write chains as a URDF, for RViz, Pinocchio and others'),
+    'demo': ('demo', 'the live demonstration: a walk played through the node, poses shown as they '
+                     'come'),
 }
 
 DESCRIPTION = """\
@@ -109,8 +112,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; return 0, or 2 after a mistake, which is told in one line on stderr."""
     words = sys.argv[1:] if argv is None else list(argv)
     if '_ARGCOMPLETE' in os.environ:
-        from argcomplete import autocomplete  # which set that variable
-        autocomplete(_parser([]))
+        from argcomplete import autocomplete  # which set these variables
+        autocomplete(_parser([word for word in os.environ['COMP_LINE'].split()
+                              if word in COMMANDS]))
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors='backslashreplace')  # a terminal that is not UTF-8
     try:
@@ -149,14 +153,15 @@ def _parser(words: Sequence[str]) -> Parser:
     subparsers = parser.add_subparsers(title='commands', metavar='COMMAND', required=True,
                                        parser_class=CommandParser)
     chosen = next((word for word in words if not word.startswith('-')), '')
-    if chosen and chosen not in MODULES and not words[0].startswith('-'):
-        raise UnknownNameError('command', chosen, MODULES)
-    for name in (chosen,) if chosen in MODULES else MODULES:
-        module = import_module(f'icub_leg_fk.tools.{MODULES[name]}')
-        subparser = subparsers.add_parser(
-            name, help=module.HELP, description=module.HELP, epilog=module.EXAMPLES)
-        module.add_arguments(subparser)
-        subparser.set_defaults(run=module.run)
+    if chosen and chosen not in COMMANDS and not words[0].startswith('-'):
+        raise UnknownNameError('command', chosen, COMMANDS)
+    for name, (module_name, purpose) in COMMANDS.items():
+        subparser = subparsers.add_parser(name, help=purpose, description=purpose)
+        if name == chosen:
+            module = import_module(f'icub_leg_fk.tools.{module_name}')
+            subparser.epilog = module.EXAMPLES
+            module.add_arguments(subparser)
+            subparser.set_defaults(run=module.run)
     return parser
 
 

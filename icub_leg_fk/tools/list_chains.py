@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
-from icub_leg_fk.tools.chain_arguments import add_json, add_kinematics_file, load_catalog
+from icub_leg_fk.kinematics.catalog import ChainEntry
+from icub_leg_fk.tools import options, text
 
-if TYPE_CHECKING:
-    from icub_leg_fk.kinematics.catalog import ChainEntry
-
-HELP = 'list the chains: versions, joints, tip frames'
 EXAMPLES = """\
 examples:
   leg_fk list
@@ -20,53 +17,39 @@ examples:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    add_kinematics_file(parser)
-    add_json(parser)
+    options.add(parser, '--kinematics-file', '--json')
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the chains."""
-    from icub_leg_fk.tools.text import json_text
-
-    catalog = load_catalog(args)
-    if args.json:
-        chains = [_as_json(entry) for entry in catalog.chains.values()]
-        print(json_text({'file': catalog.file, 'chains': chains}))
-        return 0
-    print(f'chains of {catalog.file}')
-    for entry in catalog.chains.values():
-        print()
-        print('\n'.join(_as_text(entry)))
+    catalog = options.load_catalog(args)
+    entries = catalog.chains.values()
+    print(text.as_json({'file': catalog.file, 'chains': [_as_json(entry) for entry in entries]})
+          if args.json else
+          '\n'.join([f'chains of {catalog.file}', *(_as_text(entry) for entry in entries)]))
     return 0
 
 
-def _as_text(entry: ChainEntry) -> list[str]:
-    from icub_leg_fk.tools.text import columns, indented
-
-    sources = {name: version.source for name, version in entry.versions.items()}
-    place = next(iter(entry.versions.values()))
-    rows = [['tip', f'{entry.tip}, in {place.root_frame}']]
-    rows += [['tip frames' if i == 0 else '', f'{name}: {tip.frame}']
-             for i, (name, tip) in enumerate(place.tip_frames.items())]
-    rows += [['versions' if i == 0 else '', f'{name}  ({source})' if source else name]
-             for i, (name, source) in enumerate(sources.items())]
-    names = place.joint_names
-    rows += [['joints' if i == 0 else '', '  '.join(names[i:i + 6])]
-             for i in range(0, len(names), 6)]
-    return [entry.name, *indented(columns(rows))]
+def _as_text(entry: ChainEntry) -> str:
+    table = next(iter(entry.versions.values()))
+    joints = table.joint_names
+    rows = []
+    for title, values in (
+            ('tip', [f'{entry.tip}, in {table.root_frame}']),
+            ('tip frames', [f'{name}: {tip.frame}' for name, tip in table.tip_frames.items()]),
+            ('versions', [f'{name}  ({version.source})' if version.source else name
+                          for name, version in entry.versions.items()]),
+            ('joints', ['  '.join(joints[i:i + 6]) for i in range(0, len(joints), 6)])):
+        rows += [[title if i == 0 else '', value] for i, value in enumerate(values)]
+    return '\n'.join(['', entry.name, *text.indented(text.columns(rows))])
 
 
 def _as_json(entry: ChainEntry) -> dict[str, Any]:
-    place = next(iter(entry.versions.values()))
+    table = next(iter(entry.versions.values()))
     return {
-        'name': entry.name,
-        'tip': entry.tip,
-        'root_frame': place.root_frame,
-        'joints': list(place.joint_names),
-        'tip_frames': {name: tip.frame for name, tip in place.tip_frames.items()},
-        'versions': [
-            {'name': name, 'source': version.source,
-             'joint_types': [link.joint_type for link in version.links]}
-            for name, version in entry.versions.items()
-        ],
-    }
+        'name': entry.name, 'tip': entry.tip, 'root_frame': table.root_frame,
+        'joints': list(table.joint_names),
+        'tip_frames': {name: tip.frame for name, tip in table.tip_frames.items()},
+        'versions': [{'name': name, 'source': version.source,
+                      'joint_types': [link.joint_type for link in version.links]}
+                     for name, version in entry.versions.items()]}

@@ -3,30 +3,20 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import replace
 import math
 from pathlib import Path
 import sys
-from typing import TYPE_CHECKING
 
 from icub_leg_fk.errors import InputFileError, LegFKError
-from icub_leg_fk.tools.chain_arguments import (
-    add_chain_version,
-    add_foot_frame,
-    add_kinematics_file,
-    chosen_version,
-    load_catalog,
-    number,
-    own_versions,
-)
+from icub_leg_fk.kinematics import Catalog, Chain
+from icub_leg_fk.ros.configuration import SOLE
+from icub_leg_fk.tools import options
+from icub_leg_fk.tools.drawing import check_output, feet_figure, save_picture
+from icub_leg_fk.tools.recording import ChainTrack, read_bag, read_csv, time_span
+import numpy as np
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from icub_leg_fk.kinematics import Catalog, Chain
-    from icub_leg_fk.tools.recording import ChainTrack, Tracks
-
-HELP = 'a picture of the feet over time and of the legs in space, from a bag or a CSV file'
 EXAMPLES = """\
 INPUT is a rosbag2 bag (directory, .mcap or .db3) with JointState messages, read by the node's
 own rules, or a CSV file with a column `time` in seconds and one column per joint, in radians;
@@ -40,8 +30,7 @@ examples:
   leg_fk plot walking.mcap --version v1 --foot-frame sole --joint-topic /icub/joint_states
   leg_fk plot arm.csv -k my_robot.yaml --version v1 --chains arm"""
 
-DEFAULT_CHAINS = ('left_leg', 'right_leg')
-MAX_INSTANTS = 4
+_INSTANTS = 4  # at most
 _LONGEST_NAME = 50  # characters of a title
 _LIKE = 0.02  # so much of the whole movement lower, and an instant is as good as the extreme
 
@@ -49,52 +38,37 @@ _LIKE = 0.02  # so much of the whole movement lower, and an instant is as good a
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument('input', metavar='INPUT', type=Path, help='bag or CSV file')
-    parser.add_argument('-o', '--output', metavar='FILE', type=Path,
-                        help='picture to write, .png, .svg or .pdf (default: the name of INPUT '
-                             'with .png, in this directory)')
-    parser.add_argument('--force', action='store_true', help='replace an existing picture')
-    parser.add_argument('--chains', metavar='CHAIN', nargs='+',
-                        help='chains to draw (default: left_leg right_leg)')
-    parser.add_argument('--version', metavar='VERSION',
-                        help='version of the chains (default: v2_5, if they have it)')
-    add_chain_version(parser)
-    add_foot_frame(parser)
+    options.add_output(parser, 'picture to write, .png, .svg or .pdf (default: the name of INPUT '
+                       'with .png, in this directory)')
+    options.add(parser, '--chains', '--version', '--chain-version', '--foot-frame',
+                '--joint-topic', '--kinematics-file')
     parser.add_argument('--at', metavar='T[,T...]', type=_times,
-                        help=f'up to {MAX_INSTANTS} times [s] at which to draw the legs (default: '
+                        help=f'up to {_INSTANTS} times [s] at which to draw the legs (default: '
                              'where one foot is highest above the other, or farthest ahead)')
-    for option, name, end in (('--from', 'begin', 'first'), ('--to', 'end', 'last')):
-        parser.add_argument(option, dest=name, metavar='T', type=_time,
-                            help=f'draw only from/to this time [s] (default: the {end} pose)'
-                            .replace('from/to', option[2:]))
-    parser.add_argument('--joint-topic', metavar='TOPIC',
-                        help="the bag's topic with joint states (default: /joint_states, or the "
-                             'only one there is)')
-    add_kinematics_file(parser)
+    for option, name, end in (('from', 'begin', 'first'), ('to', 'end', 'last')):
+        parser.add_argument(f'--{option}', dest=name, metavar='T',
+                            type=options.number_between(-1e15, 1e15, 'a time in seconds'),
+                            help=f'draw only {option} this time [s] (default: the {end} pose)')
 
 
 def run(args: argparse.Namespace) -> int:
     """Draw the picture."""
-    from icub_leg_fk.ros.configuration import SOLE
-    from icub_leg_fk.tools.drawing import check_output, feet_figure, save_picture
-
-    output = args.output or Path(f'{args.input.resolve().stem}.png')
+    name = args.input.resolve().name
+    output = Path(args.output or f'{Path(name).stem}.png')
     check_output(output, args.force)
     if not args.input.exists():
         raise InputFileError(f'{args.input}: there is no such file or directory; allowed: a bag '
                              'or a CSV file')
-    catalog = load_catalog(args)
+    catalog = options.load_catalog(args)
     chains = _chosen_chains(catalog, args)
-    roots = {chain.root_frame for chain in chains}
-    if len(roots) > 1:
+    if len(roots := {chain.root_frame for chain in chains}) > 1:
         raise LegFKError(f'--chains: found the root frames {", ".join(sorted(roots))}, allowed: '
                          'chains of one root frame')
-    found = _read(args.input, chains, args.joint_topic)
-    tracks = _between(found.tracks, args.begin, args.end)
+    tracks, poseless = _read(args.input, chains, args.joint_topic)
+    tracks = _between(tracks, args.begin, args.end)
     instants = _checked(args.at, tracks) if args.at else default_instants(tracks)
-    versions = dict.fromkeys(chain.version for chain in chains)
-    name = args.input.resolve().name
     shown = name if len(name) <= _LONGEST_NAME else f'{name[:_LONGEST_NAME]}...'
-    title = f'{shown}   {", ".join(versions)}'
+    title = f'{shown}   {", ".join(dict.fromkeys(chain.version for chain in chains))}'
     soles = {chain.name: catalog.chain(chain.name, chain.version, SOLE) for chain in chains
              if SOLE in catalog.entry(chain.name).versions[chain.version].tip_frames}
     save_picture(lambda: feet_figure(tracks, instants, title, soles), output, force=args.force)
@@ -104,8 +78,8 @@ def run(args: argparse.Namespace) -> int:
     if doubtful := [joint for track in tracks for joint in _like_degrees(track)]:
         print(f'leg_fk: warning: positions look like degrees, radians are expected: '
               f'{", ".join(doubtful)}', file=sys.stderr)
-    for chain in found.poseless:
-        print(f'leg_fk: note: not drawn: {chain}', file=sys.stderr)
+    for words in poseless:
+        print(f'leg_fk: note: not drawn: {words}', file=sys.stderr)
     return 0
 
 
@@ -115,9 +89,6 @@ def default_instants(tracks: Sequence[ChainTrack]) -> list[float]:
     Of two feet those where one is highest above the other and farthest ahead of it, both ways;
     else, and if the feet hardly move, evenly spaced ones.
     """
-    from icub_leg_fk.tools.recording import time_span
-    import numpy as np
-
     start, end = time_span(tracks)
     if len(tracks) == 2 and all((np.diff(track.times) >= 0).all() for track in tracks):
         one, two = tracks
@@ -126,20 +97,17 @@ def default_instants(tracks: Sequence[ChainTrack]) -> list[float]:
         instants = []
         for i, (axis, sign) in enumerate(((2, 1), (0, 1), (2, -1), (0, -1))):
             height = sign * apart[:, axis]
-            like = np.flatnonzero(height >= height.max() - _LIKE * np.ptp(height))
+            like = one.times[height >= height.max() - _LIKE * np.ptp(height)]
             # Of a gait's many steps one of the i-th quarter, so that the picture is spread out.
-            quarter = start + (end - start) * (i + 0.5) / MAX_INSTANTS
-            instants.append(float(one.times[like[np.abs(one.times[like] - quarter).argmin()]]))
-        if len(set(instants)) == MAX_INSTANTS:
+            quarter = start + (end - start) * (i + 0.5) / _INSTANTS
+            instants.append(float(like[np.abs(like - quarter).argmin()]))
+        if len(set(instants)) == _INSTANTS:
             return sorted(instants)
-    return [start + (end - start) * share for share in (0.0, 1 / 3, 2 / 3, 1.0)] \
-        if end > start else [start]
+    return np.linspace(start, end, _INSTANTS).tolist() if end > start else [start]
 
 
 def _like_degrees(track: ChainTrack) -> list[str]:
     """Return the joints that are whole turns beyond their ranges, by the node's rule."""
-    import numpy as np
-
     chain, q = track.chain, track.positions
     beyond = np.minimum(np.abs(q), np.maximum(chain.lower - q, q - chain.upper)).max(axis=0)
     return [name for name, link, far in zip(chain.joint_names, chain.joints, beyond.tolist())
@@ -148,28 +116,26 @@ def _like_degrees(track: ChainTrack) -> list[str]:
 
 def _chosen_chains(catalog: Catalog, args: argparse.Namespace) -> list[Chain]:
     """Return the chains asked for, or both legs, or else all that the catalog has."""
-    legs = [name for name in DEFAULT_CHAINS if name in catalog.chains]
+    legs = [name for name in options.LEGS if name in catalog.chains]
     names = args.chains or legs or [*catalog.chains]
-    own = own_versions(args, names)
-    return [catalog.chain(name, chosen_version(catalog, name, own.get(name, args.version)),
+    own = options.own_versions(args, names)
+    return [catalog.chain(name, options.chosen_version(catalog, name, own.get(name, args.version)),
                           args.foot_frame) for name in dict.fromkeys(names)]
 
 
-def _read(path: Path, chains: Sequence[Chain], topic: str | None) -> Tracks:
-    from icub_leg_fk.tools.recording import read_bag, read_csv, Tracks
-
+def _read(path: Path, chains: Sequence[Chain], topic: str | None
+          ) -> tuple[list[ChainTrack], list[str]]:
+    """Return what the chains did, and words on those without a pose."""
     if path.suffix.lower() != '.csv':
         return read_bag(path, chains, topic)
     if topic is not None:
         raise LegFKError(f'--joint-topic: {path} is a CSV file, which has no topics')
-    joints = dict.fromkeys(name for chain in chains for name in chain.joint_names)
-    recording = read_csv(path, joints)
-    return Tracks([recording.track(chain) for chain in chains])
+    recording = read_csv(path, dict.fromkeys(
+        name for chain in chains for name in chain.joint_names))
+    return [recording.track(chain) for chain in chains], []
 
 
 def _checked(instants: list[float], tracks: Sequence[ChainTrack]) -> list[float]:
-    from icub_leg_fk.tools.recording import time_span
-
     start, end = time_span(tracks)
     for instant in instants:
         if not start <= instant <= end:
@@ -180,8 +146,6 @@ def _checked(instants: list[float], tracks: Sequence[ChainTrack]) -> list[float]
 def _between(tracks: Sequence[ChainTrack], begin: float | None, end: float | None
              ) -> list[ChainTrack]:
     """Return the parts of the tracks from one time to another [s]."""
-    from icub_leg_fk.tools.recording import time_span
-
     start, stop = time_span(tracks)
     begin, end = start if begin is None else begin, stop if end is None else end
     inside = [(track.times >= begin) & (track.times <= end) for track in tracks]
@@ -192,19 +156,10 @@ def _between(tracks: Sequence[ChainTrack], begin: float | None, end: float | Non
             for track, mask in zip(tracks, inside)]
 
 
-def _time(text: str) -> float:
-    try:
-        [time] = _times(text)
-    except (argparse.ArgumentTypeError, ValueError):
-        raise argparse.ArgumentTypeError(f'found {text.strip()!r}, allowed: a time in seconds'
-                                         ) from None
-    return time
-
-
 def _times(text: str) -> list[float]:
-    times = [number(word) for word in text.split(',')]
-    if not 0 < len(times) <= MAX_INSTANTS or not all(map(math.isfinite, times)):
+    times = [options.number(word) for word in text.split(',')]
+    if len(times) > _INSTANTS or not all(map(math.isfinite, times)):
         raise argparse.ArgumentTypeError(
-            f'found {text.strip()!r}, allowed: up to {MAX_INSTANTS} times in seconds, '
+            f'found {text.strip()!r}, allowed: up to {_INSTANTS} times in seconds, '
             'separated by commas')
     return times

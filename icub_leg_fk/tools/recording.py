@@ -5,7 +5,7 @@ from __future__ import annotations
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
 import csv
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 import math
 from pathlib import Path
@@ -15,7 +15,10 @@ from typing import Any
 from icub_leg_fk.errors import InputFileError
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
-from icub_leg_fk.tools.chain_arguments import LARGEST, number
+from icub_leg_fk.ros.configuration import DEFAULT_TIMEOUT
+from icub_leg_fk.ros.joint_input import JointInput
+from icub_leg_fk.tools.bag_reading import joint_connections, messages, open_bag
+from icub_leg_fk.tools.options import LARGEST, number
 import numpy as np
 
 TIMES = ('time', 'Time', 'timestamp')
@@ -25,17 +28,11 @@ _DELIMITERS = ',;\t'
 
 @dataclass(frozen=True)
 class JointRecording:
-    """Joint positions over time.
-
-    Attributes:
-        joint_names: n joint names.
-        times: (N,) times [s], not decreasing.
-        positions: (N, n) joint positions [rad].
-    """
+    """Joint positions over time."""
 
     joint_names: tuple[str, ...]
-    times: Array
-    positions: Array
+    times: Array  # (N,) [s], not decreasing
+    positions: Array  # (N, n) [rad]
 
     def first(self, seconds: float) -> JointRecording:
         """Return the part up to a time after the first sample [s]."""
@@ -50,37 +47,17 @@ class JointRecording:
 
 @dataclass(frozen=True)
 class ChainTrack:
-    """What one chain did over time.
-
-    Attributes:
-        chain: the chain, with its n joints.
-        times: (N,) times [s].
-        positions: (N, n) joint positions [rad or m].
-        received: (N, 7) poses of the tip as a node sent them; None to compute them.
-    """
+    """What one chain did over time."""
 
     chain: Chain
-    times: Array
-    positions: Array
-    received: Array | None = None
+    times: Array  # (N,) [s]
+    positions: Array  # (N, n) [rad or m]
+    received: Array | None = None  # (N, 7) poses as a node sent them; None to compute them
 
     @cached_property
     def poses(self) -> Array:
         """(N, 7) rows x, y, z [m], qx, qy, qz, qw of the tip in the root frame."""
         return self.chain.poses(self.positions) if self.received is None else self.received
-
-
-@dataclass
-class Tracks:
-    """What chains did in a recording.
-
-    Attributes:
-        tracks: one per chain that has a pose at all; times from the first pose on.
-        poseless: chains without a pose, and the joints that were missing.
-    """
-
-    tracks: list[ChainTrack] = field(default_factory=list)
-    poseless: list[str] = field(default_factory=list)
 
 
 def time_span(tracks: Sequence[ChainTrack]) -> tuple[float, float]:
@@ -89,15 +66,13 @@ def time_span(tracks: Sequence[ChainTrack]) -> tuple[float, float]:
             max(float(track.times.max()) for track in tracks))
 
 
-def read_bag(path: Path, chains: Sequence[Chain], topic: str | None) -> Tracks:
+def read_bag(path: Path, chains: Sequence[Chain], topic: str | None
+             ) -> tuple[list[ChainTrack], list[str]]:
     """Return what some chains did in a bag, by the node's own input rules.
 
-    The topic of the joint states is `/joint_states`, or the only one there is, if None.
+    Chains without a pose are in words, with what was missing. The topic of the joint states is
+    `/joint_states`, or the only one there is, if None.
     """
-    from icub_leg_fk.ros.configuration import DEFAULT_TIMEOUT
-    from icub_leg_fk.ros.joint_input import JointInput
-    from icub_leg_fk.tools.bag_reading import joint_connections, messages, open_bag
-
     stamps = [array('q') for _ in chains]
     positions = [array('d') for _ in chains]
     now = 0  # when the bag received the present message [ns], for one without a stamp
@@ -109,22 +84,21 @@ def read_bag(path: Path, chains: Sequence[Chain], topic: str | None) -> Tracks:
                 stamps[vector.chain].append(vector.sec * 1_000_000_000 + vector.nanosec)
                 positions[vector.chain].extend(vector.positions)
     start = min((stamp[0] for stamp in stamps if stamp), default=0)
-    found = Tracks()
+    tracks, poseless = [], []
     for index, chain in enumerate(chains):
         if stamps[index]:
             times = (np.frombuffer(stamps[index], dtype=np.int64) - start) / 1e9
-            found.tracks.append(ChainTrack(
+            tracks.append(ChainTrack(
                 chain, times, np.frombuffer(positions[index]).reshape(len(times), -1)))
         else:
             known = joint_input.known_joints(index)
-            missing = [name for name in chain.joint_names if name not in known]
-            found.poseless.append(f'{chain.name} needs '
-                                  f'{", ".join(missing) or "joint positions that are finite"}')
-    if not found.tracks:
+            missing = ', '.join(name for name in chain.joint_names if name not in known)
+            poseless.append(f'{chain.name} needs {missing or "joint positions that are finite"}')
+    if not tracks:
         shown = ', '.join(joint_input.names_since()[:20]) or 'none'
         raise InputFileError(f'{path}: no pose in {joint_input.messages} joint states: '
-                             f'{"; ".join(found.poseless)}; names found: {shown}')
-    return found
+                             f'{"; ".join(poseless)}; names found: {shown}')
+    return tracks, poseless
 
 
 def read_csv(path: str | Path, joint_names: Iterable[str]) -> JointRecording:

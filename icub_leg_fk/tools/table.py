@@ -8,16 +8,17 @@ from pathlib import Path
 import re
 import sys
 import tempfile
-from typing import TYPE_CHECKING
 
 from icub_leg_fk.errors import LegFKError
-from icub_leg_fk.tools.chain_arguments import number_between
+from icub_leg_fk.kinematics import Catalog, Chain, chain_from_urdf, DHLink, Urdf
+from icub_leg_fk.kinematics.chain import modified_rows
+from icub_leg_fk.kinematics.rotation import angle_between, Array
+from icub_leg_fk.kinematics.table_from_urdf import almost_parallel
+from icub_leg_fk.tools import options
+from icub_leg_fk.tools.output_file import check_target, write_text
+from icub_leg_fk.tools.text import short
+import numpy as np
 
-if TYPE_CHECKING:
-    from icub_leg_fk.kinematics import Chain, DHLink, Urdf
-    from icub_leg_fk.kinematics.rotation import Array
-
-HELP = 'make the DH table of any robot from its URDF, as a kinematics file for every command'
 EXAMPLES = """\
 Carries out the documented method on a URDF: z axes, origins, x axes, y axes, DH parameters,
 product. Each tip becomes a chain; the file has joint names, limits as ranges, T_Ro0, rows, T_nIs
@@ -45,21 +46,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--convention', metavar='{standard,modified}', default='standard',
                         choices=('standard', 'modified'),
                         help="of the table: standard (the default), or modified, which is Craig's")
-    parser.add_argument('--tolerance', metavar='RAD', type=number_between(0, 0.1, ' rad'),
-                        default=1e-4,
+    parser.add_argument('--tolerance', metavar='RAD', default=1e-4,
+                        type=options.number_between(0, 0.1, '0 to 0.1 rad'),
                         help='angle between axes up to which they are taken as parallel, since '
                              'URDFs are rounded (default: 1e-4); what it cost is said')
-    parser.add_argument('-o', '--output', metavar='FILE',
-                        help='file to write (default: standard output)')
-    parser.add_argument('--force', action='store_true', help='replace an existing file')
+    options.add_output(parser, 'file to write (default: standard output)')
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the kinematics file."""
-    from icub_leg_fk.kinematics import Catalog, chain_from_urdf, Urdf
-    from icub_leg_fk.kinematics.table_from_urdf import almost_parallel
-    from icub_leg_fk.tools.output_file import check_target, write_text
-
     if args.output:
         check_target(args.output, force=args.force)
     urdf = Urdf.load(args.urdf)
@@ -100,9 +95,6 @@ def run(args: argparse.Namespace) -> int:
 
 def largest_difference(chain: Chain, urdf: Urdf) -> tuple[float, float]:
     """Return how far a chain is from a URDF at most, of seeded random postures [m, rad]."""
-    from icub_leg_fk.kinematics.rotation import angle_between
-    import numpy as np
-
     rng = np.random.default_rng(2955)
     lower = np.where(np.isfinite(chain.lower), chain.lower, -math.pi)
     upper = np.where(np.isfinite(chain.upper), chain.upper, math.pi)
@@ -126,8 +118,6 @@ def table_text(urdf: Urdf, chains: list[Chain], tolerance: float) -> str:
 
 
 def _chain_lines(chain: Chain, urdf: Urdf) -> list[str]:
-    from icub_leg_fk.kinematics.chain import modified_rows
-
     rows = modified_rows(chain) if chain.convention == 'modified' else chain.links
     lines = [f'  {chain.name}:', f'    tip: {_word(chain.name)}',
              f'    root_frame: {chain.root_frame}',
@@ -150,32 +140,26 @@ def _row_lines(rows: tuple[DHLink, ...]) -> list[str]:
         lower, upper = row.limits
         more = ''
         if not row.is_fixed and (lower, upper) != (-math.inf, math.inf):
-            more += f', range: [{_decimal(scale * lower, 9)}, {_decimal(scale * upper, 9)}]'
+            more += f', range: [{short(scale * lower, 9)}, {short(scale * upper, 9)}]'
         if row.joint_type != 'revolute':
             more += f', type: {row.joint_type}'
         if row.sign != 1:
             more += ', sign: -1'
-        cells.append((_decimal(1000 * row.a, 10), _decimal(1000 * row.d, 10),
-                      _decimal(math.degrees(row.alpha), 13),
-                      _decimal(math.degrees(row.offset), 13), more))
+        cells.append((short(1000 * row.a, 10), short(1000 * row.d, 10),
+                      short(math.degrees(row.alpha), 13),
+                      short(math.degrees(row.offset), 13), more))
     widths = [max(map(len, column)) for column in zip(*cells)]
     return [f'a: {a:>{widths[0]}}, d: {d:>{widths[1]}}, alpha: {alpha:>{widths[2]}}, '
             f'offset: {offset:>{widths[3]}}{more}' for a, d, alpha, offset, more in cells]
 
 
 def _matrix_lines(T: Array) -> list[str]:
-    rows = [[_decimal(value, 16) for value in row[:3]] + [_decimal(1000 * row[3], 10)]
+    rows = [[short(value, 16) for value in row[:3]] + [short(1000 * row[3], 10)]
             for row in T.tolist()]
     rows[3][3] = '1'
     widths = [max(map(len, column)) for column in zip(*rows)]
     return ['          - [' + ', '.join(
         f'{value:>{width}}' for value, width in zip(row, widths)) + ']' for row in rows]
-
-
-def _decimal(value: float, decimals: int) -> str:
-    """Return a number with no more decimals than it has, and no more than so many."""
-    text = f'{round(value, decimals) + 0.0:.{decimals}f}'
-    return text.rstrip('0').rstrip('.')
 
 
 def _word(name: str) -> str:

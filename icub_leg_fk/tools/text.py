@@ -29,23 +29,16 @@ def short(value: float, decimals: int = 4) -> str:
     return text.rstrip('0').rstrip('.') if '.' in text else text
 
 
-def position_text(link: DHLink, position: float) -> str:
+def position(link: DHLink, value: float) -> str:
     """Return a joint position [rad or m] as `12.5 deg` or, if prismatic, `0.2 m`."""
-    return f'{short(*position_in(link, position))} {"m" if link.is_prismatic else "deg"}'
+    return (f'{short(value, 6)} m' if link.is_prismatic
+            else f'{short(math.degrees(value))} deg')
 
 
-def range_text(link: DHLink) -> str:
+def joint_range(link: DHLink) -> str:
     """Return the range that counts as `-44 .. 132 deg`; nothing if there is none."""
-    low, high = link.limits
-    if low == -math.inf and high == math.inf:
-        return ''
-    lower, _ = position_in(link, low)
-    return f'{short(lower)} .. {position_text(link, high)}'
-
-
-def position_in(link: DHLink, position: float) -> tuple[float, int]:
-    """Return a joint position in degrees, or metres if prismatic, and its useful decimals."""
-    return (position, 6) if link.is_prismatic else (math.degrees(position), 4)
+    lower, upper = (position(link, limit) for limit in link.limits)
+    return f'{lower.split()[0]} .. {upper}' if math.isfinite(link.limits[0]) else ''
 
 
 def range_notes(chain: Chain, q: Sequence[float]) -> list[str]:
@@ -53,14 +46,13 @@ def range_notes(chain: Chain, q: Sequence[float]) -> list[str]:
     outside = chain.out_of_range(q)
     notes = []
     for name, link, value in zip(chain.joint_names, chain.joints, q, strict=True):
+        found = f'note: {name} = {position(link, value)}'
         if link.is_prismatic and abs(value) >= _UNLIKELY:
-            notes.append(f'note: {name} = {position_text(link, value)}: positions of prismatic '
-                         'joints are in metres; is it meant?')
+            notes.append(f'{found}: positions of prismatic joints are in metres; is it meant?')
         if name in outside:
             erratum = f' (known erratum of the table: {link.erratum})' if link.erratum else ''
-            notes.append('\n'.join(wrapped(
-                f'note: {name} = {position_text(link, value)} is outside its range '
-                f'{range_text(link)}{erratum}; computed as given, never clamped')))
+            notes.append(f'{found} is outside its range {joint_range(link)}{erratum}; computed as '
+                         'given, never clamped')
     return notes
 
 
@@ -71,10 +63,7 @@ def columns(rows: Rows, gap: str = '  ', header: Sequence[str] = ()) -> list[str
     """
     aligned = [_aligned(column) for column in zip(*rows, strict=True)]
     if header:
-        widths = [max(len(title), len(column[0]))
-                  for title, column in zip(header, aligned, strict=True)]
-        aligned = [[cell.ljust(width) for cell in (title, *column)]
-                   for title, column, width in zip(header, aligned, widths, strict=True)]
+        aligned = [_aligned((title, *column)) for title, column in zip(header, aligned)]
     return [gap.join(cells).rstrip() for cells in zip(*aligned, strict=True)]
 
 
@@ -108,7 +97,7 @@ def wrapped(text: str, after: str = '  ', margin: int = 0) -> list[str]:
                          break_on_hyphens=False)
 
 
-def json_text(value: Any) -> str:
+def as_json(value: Any) -> str:
     """Return JSON with its innermost lists of numbers or words on one line each.
 
     Raises:
@@ -118,29 +107,20 @@ def json_text(value: Any) -> str:
         text = json.dumps(value, indent=2, allow_nan=False)
     except ValueError as error:
         raise LegFKError('found lengths too large to compute with') from error
-    return re.sub(r'\[\n\s*([^][{}]*?)\n\s*\]', _on_one_line, text)
-
-
-def _on_one_line(found: re.Match[str]) -> str:
-    words = re.sub(r'\n\s*', ' ', found[1])
-    return f'[{words}]'
+    return re.sub(r'\[\n\s*([^][{}]*?)\n\s*\]',
+                  lambda found: re.sub(r'\n\s*', ' ', f'[{found[1]}]'), text)
 
 
 def _aligned(column: Sequence[str], centred: bool = False) -> list[str]:
     """Pad the cells of a column to one width."""
-    if all(map(_is_number, filter(None, column))):
+    if all(cell.strip('-').replace('.', '', 1).isdigit() for cell in column if cell):
         decimals = [len(cell) - len(cell.partition('.')[0]) for cell in column]
         column = [cell + ' ' * (max(decimals) - own)
                   for cell, own in zip(column, decimals, strict=True)]
-        width = max(map(len, column))
-        return [cell.rjust(width) for cell in column]
+        return [cell.rjust(max(map(len, column))) for cell in column]
     width = max(map(len, column))
     if not centred:
         return [cell.ljust(width) for cell in column]
     # A minus sign hangs out to the left, so that s_0 and -s_0 stand under each other.
     return [(' ' * ((width - len(cell.lstrip('-'))) // 2 - cell.startswith('-')) + cell)
             .ljust(width) for cell in column]
-
-
-def _is_number(text: str) -> bool:
-    return text.strip('-').replace('.', '', 1).isdigit()

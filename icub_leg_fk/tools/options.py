@@ -1,0 +1,154 @@
+"""What subcommands share: options by their names, and the chains and joint positions they mean."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+import math
+import sys
+from typing import Any
+
+from icub_leg_fk.errors import JointVectorError, LegFKError
+from icub_leg_fk.kinematics import Catalog, Chain
+
+LEGS = ('left_leg', 'right_leg')
+DEFAULT_VERSION = 'v2_5'
+LARGEST = 1e9  # of a joint position; beyond it a float's last turn is lost anyway
+
+
+def _chain_version(text: str) -> tuple[str, str]:
+    chain, _, version = text.strip().partition('=')
+    if not (chain and version):
+        raise argparse.ArgumentTypeError(f'found {text.strip()!r}, allowed: CHAIN=VERSION')
+    return chain, version
+
+
+_OPTIONS: dict[str, dict[str, Any]] = {
+    'chain': {'metavar': 'CHAIN',
+              'help': 'a chain of the kinematics file, such as left_leg (see leg_fk list)'},
+    '--chains': {'metavar': 'CHAIN', 'nargs': '+',
+                 'help': 'chains of the kinematics file (default: left_leg right_leg)'},
+    '--version': {'metavar': 'VERSION',
+                  'help': f'version of the tables (default: {DEFAULT_VERSION})'},
+    '--chain-version': {'metavar': 'CHAIN=VERSION', 'action': 'append', 'default': [],
+                        'type': _chain_version,
+                        'help': 'version of one chain; may stand several times'},
+    '--foot-frame': {'metavar': 'FRAME',
+                     'help': "axes of the tip: of the iCub's feet dh, the table's last frame (the "
+                             'default), or sole, x forward, y left, z up; of another robot what '
+                             'your file has'},
+    '--joint-topic': {'metavar': 'TOPIC', 'help': "the bag's topic of joint states (default: "
+                      '/joint_states, or the only one there is)'},
+    '--json': {'action': 'store_true', 'help': 'print JSON, for programs'},
+    '--kinematics-file': {'metavar': 'FILE',
+                          'help': 'a kinematics file of your own, with the DH tables of any robot '
+                                  "(default: the iCub's, as shipped)"},
+    '--force': {'action': 'store_true', 'help': 'replace what exists already'},
+}
+
+
+def add(parser: argparse._ActionsContainer, *names: str) -> None:
+    """Add shared options."""
+    for name in names:
+        flags = ('-k', name) if name == '--kinematics-file' else (name,)
+        action = parser.add_argument(*flags, **_OPTIONS[name])
+        if name in _COMPLETERS:
+            setattr(action, 'completer', _COMPLETERS[name])  # noqa: B010 (it is argcomplete's)
+
+
+def _known_chains(parsed_args: argparse.Namespace, **_: object) -> list[str]:
+    return [*Catalog.load(parsed_args.kinematics_file).chains]
+
+
+def _known_versions(parsed_args: argparse.Namespace, **_: object) -> list[str]:
+    chains = Catalog.load(parsed_args.kinematics_file).chains.values()
+    return [*dict.fromkeys(version for entry in chains for version in entry.versions)]
+
+
+_COMPLETERS = {'chain': _known_chains, '--chains': _known_chains, '--version': _known_versions}
+
+
+def add_output(parser: argparse.ArgumentParser, purpose: str) -> None:
+    """Add `--output` and `--force`."""
+    parser.add_argument('-o', '--output', metavar='FILE', help=purpose)
+    add(parser, '--force')
+
+
+def add_joint_positions(parser: argparse.ArgumentParser, *, required: bool) -> None:
+    """Add `--degrees` and `--radians`, of which at most one may be given."""
+    group = parser.add_mutually_exclusive_group(required=required)
+    for unit in ('degrees', 'radians'):
+        group.add_argument(
+            f'--{unit}', metavar='Q', nargs='+', type=_joint_position,
+            help=f'joint positions in {unit}, root to tip; of a prismatic joint always in metres')
+
+
+def number(text: str) -> float:
+    """Return the number that a text is; NaN if it is none."""
+    try:
+        return float(text) if text.isascii() and '_' not in text else math.nan
+    except ValueError:
+        return math.nan
+
+
+def number_between(low: float, high: float, allowed: str = '') -> Callable[[str], float]:
+    """Return what reads an option that is a number from one to another, both included."""
+    def parse(text: str) -> float:
+        value = number(text)
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f'found {text.strip()!r}, allowed: '
+                                             f'{allowed or f"{low:g} to {high:g}"}')
+        return value
+    return parse
+
+
+_joint_position = number_between(
+    -LARGEST, LARGEST, f'finite numbers up to {LARGEST:g}, one per joint')
+
+
+def own_versions(args: argparse.Namespace, chains: Sequence[str]) -> dict[str, str]:
+    """Return the versions given by `--chain-version`, for chains that may have one."""
+    versions: dict[str, str] = {}
+    for chain, version in args.chain_version:
+        if chain not in chains or chain in versions:
+            raise LegFKError(f'--chain-version: found {chain}{" again" * (chain in versions)}, '
+                             f'allowed: {", ".join(chains)}, each once')
+        versions[chain] = version
+    return versions
+
+
+def chosen_version(catalog: Catalog, chain: str, version: str | None) -> str:
+    """Return the version asked for, or else the default one if the chain has that."""
+    versions = catalog.entry(chain).versions
+    if version is None and DEFAULT_VERSION not in versions:
+        raise LegFKError(f'chain {chain} has no version {DEFAULT_VERSION}, the default: give '
+                         f'--version; known: {", ".join(versions)}')
+    return DEFAULT_VERSION if version is None else version
+
+
+def load_catalog(args: argparse.Namespace) -> Catalog:
+    """Return the catalog that `-k` names; what it warns of is said on stderr."""
+    catalog = Catalog.load(args.kinematics_file)
+    for line in catalog.warnings:
+        print(f'leg_fk: warning: {line}', file=sys.stderr)
+    return catalog
+
+
+def load_chain(args: argparse.Namespace) -> tuple[Catalog, Chain]:
+    """Return the catalog, and the chain that its options name."""
+    catalog = load_catalog(args)
+    version = chosen_version(catalog, args.chain, args.version)
+    return catalog, catalog.chain(args.chain, version, args.foot_frame)
+
+
+def joint_positions(args: argparse.Namespace, chain: Chain) -> list[float] | None:
+    """Return the joint vector given by `--degrees` or `--radians` [rad or m]; None if none is."""
+    given: Sequence[float] | None = args.radians if args.degrees is None else args.degrees
+    if given is None:
+        return None
+    if len(given) != chain.n:
+        raise JointVectorError(
+            f'joint positions: found {len(given)}, allowed: {chain.n}, in the order '
+            f'{" ".join(chain.joint_names)}')
+    return [value if args.degrees is None or link.is_prismatic else math.radians(value)
+            for value, link in zip(given, chain.joints, strict=True)]
