@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from itertools import pairwise
 import logging
 import math
 import os
@@ -104,18 +103,13 @@ def feet_figure(tracks: Sequence[ChainTrack], instants: Sequence[float], title: 
     rows = [(track.chain, *outside) for track in tracks for outside in outside_ranges(track)]
     height = _HEIGHT + _ROW * max(0, len(rows) - 1)
     figure = Figure(figsize=(_WIDTH, height))
-    top, bottom = 1 - 1.35 / height, 0.65 / height
-    figure.text(0.03, 1 - 0.35 / height, title, fontsize=19, weight='bold', va='center')
-    grid = figure.add_gridspec(
-        3 + bool(rows), 1, left=0.075, right=0.5, top=top, bottom=bottom, hspace=0.42,
-        height_ratios=[1, 1, 1, *([_ROW * (len(rows) + 0.3) / 1.6] if rows else [])])
-    panels = [figure.add_subplot(grid[i]) for i in range(3 + bool(rows))]
+    panels = figure.subplots(3 + bool(rows), sharex=True, gridspec_kw={
+        'left': 0.075, 'right': 0.5, 'top': 1 - 1.35 / height, 'bottom': 0.65 / height,
+        'hspace': 0.42, 'height_ratios': [1, 1, 1, _ROW * (len(rows) + 0.3) / 1.6][
+            :3 + bool(rows)]})
     _draw_tips(panels[:3], tracks)
     if rows:
-        panels[3].sharex(panels[0])
         _draw_outside_ranges(panels[3], rows)
-    for panel in panels[:-1]:
-        panel.tick_params(labelbottom=False)
     panels[-1].set_xlabel('time [s]')
     _mark_instants(panels[:3], instants)
     spaces = figure.add_gridspec(
@@ -129,11 +123,12 @@ def feet_figure(tracks: Sequence[ChainTrack], instants: Sequence[float], title: 
         _draw_scene(space, scene, soles)
         space.axes.text2D(0.06, 0.95, f'{"ABCD"[i]}  {instant:.2f} s', weight='bold',
                           transform=space.axes.transAxes)
-    figure.text(0.03, 1 - 0.8 / height, _notes(tracks), fontsize=10.5, va='center', color=FAINT)
     frames = ', '.join(dict.fromkeys(
         [tracks[0].chain.root_frame, *(track.chain.tip_frame for track in tracks)]))
-    figure.text(0.985, 1 - 0.8 / height, f'axes of {frames};  squares of {space.step:g} m',
-                fontsize=10.5, ha='right', va='center', color=FAINT)
+    figure.text(0.03, 1 - 0.35 / height, title, fontsize=19, weight='bold', va='center')
+    for x, side, words in ((0.03, 'left', _notes(tracks)),
+                           (0.985, 'right', f'axes of {frames};  squares of {space.step:g} m')):
+        figure.text(x, 1 - 0.8 / height, words, fontsize=10.5, ha=side, va='center', color=FAINT)
     return figure
 
 
@@ -198,11 +193,11 @@ class Space:
         self.axes.set_box_aspect(highest - lowest, zoom=zoom)
         xs, ys = (np.arange(low, high + self.step / 2, self.step)
                   for low, high in zip(lowest[:2], highest[:2]))
-        self.fill([(x, y, self.low) for x, y in (
-            (xs[0], ys[0]), (xs[-1], ys[0]), (xs[-1], ys[-1]), (xs[0], ys[-1]))], FLOOR, 0)
-        for ends in (*(((x, ys[0]), (x, ys[-1])) for x in xs),
-                     *(((xs[0], y), (xs[-1], y)) for y in ys)):
-            self.line([(*end, self.low) for end in ends], color=GRID, linewidth=1, zorder=1)
+        self.fill([(xs[i], ys[j], self.low) for i, j in ((0, 0), (-1, 0), (-1, -1), (0, -1))],
+                  FLOOR, 0)
+        for x, y in (*((x, ys[[0, -1]]) for x in xs), *((xs[[0, -1]], y) for y in ys)):
+            self.line(np.transpose(np.broadcast_arrays(x, y, [self.low] * 2)), color=GRID,
+                      linewidth=1, zorder=1)
 
     def depth(self, points: Array) -> float:
         """Return how near the middle of some points is to the viewer [m]; larger is nearer."""
@@ -273,8 +268,6 @@ def _draw_tips(panels: Sequence[Axes], tracks: Sequence[ChainTrack]) -> None:
         panel.locator_params(axis='y', nbins=4)
     start, end = time_span(tracks)
     panels[0].set_xlim((start, end) if end > start else (start - 0.5, end + 0.5))
-    for panel in panels[1:]:
-        panel.sharex(panels[0])
     panels[0].legend(loc='lower right', bbox_to_anchor=(1.0, 0.97), ncols=len(tracks), fontsize=11,
                      borderpad=0, handlelength=1.2, columnspacing=1.2)
 
@@ -298,14 +291,11 @@ def _draw_curve(panel: Axes, track: ChainTrack, column: int) -> None:
                    color=color, label=label, linewidth=2,
                    marker='o' if len(np.unique(times)) < 3 else '')
         return
-    ends = [0, *breaks.tolist(), len(times)]
-    edges = np.unique(np.concatenate([
-        np.linspace(a, b, 1 + math.ceil(_COLUMNS * (b - a) / len(times))).astype(int)
-        for a, b in pairwise(ends)]))
-    holes = np.searchsorted(edges, breaks)
-    middle, lowest, highest = (
-        np.insert([float(pick(of[a:b])) for a, b in pairwise(edges)], holes, np.nan)
-        for pick, of in ((np.mean, times), (np.min, values), (np.max, values)))
+    edges = np.unique(np.r_[np.linspace(0, len(times), _COLUMNS).astype(int), breaks])
+    starts, holes = edges[:-1], np.searchsorted(edges, breaks)
+    middle, lowest, highest = (np.insert(column, holes, np.nan) for column in (
+        np.add.reduceat(times, starts) / np.diff(edges),
+        np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)))
     panel.fill_between(middle, lowest, highest, color=color, alpha=0.3, linewidth=0)
     panel.plot(middle, lowest, color=color, linewidth=1)
     panel.plot(middle, highest, color=color, linewidth=1, label=label)

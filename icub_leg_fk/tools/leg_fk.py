@@ -12,7 +12,9 @@ from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
 import io
+from itertools import takewhile
 import os
+import re
 import sys
 from typing import Any, NoReturn
 
@@ -55,6 +57,7 @@ examples:
 
 INTERRUPTED = 128 + 2  # as a shell reports SIGINT
 PIPE_CLOSED = 128 + 13  # and SIGPIPE
+_NEGATIVE = re.compile(r'-(inf|nan|(\d+\.?\d*|\.\d+)(e[-+]?\d+)?)(,|$)', re.IGNORECASE)
 
 
 class Parser(argparse.ArgumentParser):
@@ -67,45 +70,25 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Parse the arguments; `-1e-3` is a value, which argparse alone takes for an option."""
         # A word that starts with a space is never an option, and float() ignores the space.
-        args = [f' {arg}' if _is_negative(arg) else arg for arg in args or ()]
+        args = [f' {word}' if _NEGATIVE.match(word) else word for word in args or ()]
         return super().parse_known_args(args, namespace)
 
     def error(self, message: str) -> NoReturn:
         """Raise the mistake, for `main` to report."""
         raise LegFKError(f'{message} (see {self.prog} -h)')
 
-
-class CommandParser(Parser):
-    """The parser of one subcommand, whose options may stand anywhere: `bag IN --twist OUT`."""
-
-    _mixing = False
-
-    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Parse the arguments."""
-        if self._mixing:  # argparse comes back here for each of its two passes
-            return super().parse_known_args(args, namespace)
-        self._refuse_unknown_options(args or ())
-        self._mixing = True
-        try:
-            return self.parse_known_intermixed_args(args, namespace)
-        finally:
-            self._mixing = False
-
-    def _refuse_unknown_options(self, words: Sequence[str]) -> None:
+    def refuse_unknown_options(self, words: Sequence[str]) -> None:
         """Name an option that does not exist; argparse would miss a required one instead."""
         known = self._option_string_actions
-        for word in words:
-            if word == '--':
-                return
+        for word in takewhile('--'.__ne__, words):
             option = word.partition('=')[0]
-            if (not word.startswith('-') or word == '-' or option in known
+            if (not word.startswith('-') or word == '-' or _NEGATIVE.match(word) or option in known
                     or (word[:2] in known and not word.startswith('--'))):
                 continue
             guess = near(option, known) or next(
                 (name for name in known if name.startswith('--') and len(option) > 3
                  and option[2:] in name), '')
-            hint = f'; did you mean {guess}?' if guess else ''
-            self.error(f'unknown option {option}{hint}')
+            self.error(f'unknown option {option}{f"; did you mean {guess}?" if guess else ""}')
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -113,8 +96,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = sys.argv[1:] if argv is None else list(argv)
     if '_ARGCOMPLETE' in os.environ:
         from argcomplete import autocomplete  # which set these variables
-        autocomplete(_parser([word for word in os.environ['COMP_LINE'].split()
-                              if word in COMMANDS]))
+        autocomplete(_parsers(os.environ['COMP_LINE'].split()[1:])[0])
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors='backslashreplace')  # a terminal that is not UTF-8
     try:
@@ -135,45 +117,34 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(words: list[str]) -> int:
-    parser = _parser(words)
-    if not words:
-        parser.print_help()
-        return 0
+    parser, parsers = _parsers(words)
     try:
-        args = parser.parse_args(words)
+        if words and words[0] in parsers:
+            parser = parsers[words[0]]
+            parser.refuse_unknown_options(words[1:])
+            args = parser.parse_intermixed_args(words[1:])  # as in: bag IN --twist OUT
+            return int(args.run(args))
+        if words and not words[0].startswith('-'):
+            raise UnknownNameError('command', words[0], COMMANDS)
+        parser.parse_args(words or ['-h'])
     except SystemExit as done:  # -h and --version
         return int(done.code or 0)
-    return int(args.run(args))
+    return 0
 
 
-def _parser(words: Sequence[str]) -> Parser:
-    """Return the parser: of the one subcommand that is asked for, else of all."""
+def _parsers(words: Sequence[str]) -> tuple[Parser, dict[str, Parser]]:
+    """Return the command's parser, and its subcommands'; only the one asked for has options."""
     parser = Parser(prog='leg_fk', description=DESCRIPTION, epilog=EXAMPLES)
     parser.add_argument('--version', action='version', version=f'leg_fk {__version__}')
-    subparsers = parser.add_subparsers(title='commands', metavar='COMMAND', required=True,
-                                       parser_class=CommandParser)
-    chosen = next((word for word in words if not word.startswith('-')), '')
-    if chosen and chosen not in COMMANDS and not words[0].startswith('-'):
-        raise UnknownNameError('command', chosen, COMMANDS)
+    subparsers = parser.add_subparsers(title='commands', metavar='COMMAND', required=True)
     for name, (module_name, purpose) in COMMANDS.items():
         subparser = subparsers.add_parser(name, help=purpose, description=purpose)
-        if name == chosen:
+        if name in words[:1]:
             module = import_module(f'icub_leg_fk.tools.{module_name}')
             subparser.epilog = module.EXAMPLES
             module.add_arguments(subparser)
             subparser.set_defaults(run=module.run)
-    return parser
-
-
-def _is_negative(word: str) -> bool:
-    """Return whether a word is a negative number, or a list of numbers that begins with one."""
-    if not word.startswith('-'):
-        return False
-    try:
-        float(word.partition(',')[0])
-    except ValueError:
-        return False
-    return True
+    return parser, subparsers.choices
 
 
 def _forget_output() -> None:
