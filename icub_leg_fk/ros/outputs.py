@@ -6,16 +6,14 @@ goes, and only then is it decided anew what a chain's joint vectors become.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import Any, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped, TwistStamped
-from icub_leg_fk.kinematics import Chain
-from icub_leg_fk.kinematics.solver import Pose
-from icub_leg_fk.ros.cdr import PoseStampedEncoder, TFMessageEncoder, TwistStampedEncoder
 from icub_leg_fk.ros.configuration import Configuration
 from icub_leg_fk.ros.joint_input import Ready
+from icub_leg_fk.ros.pose_stream import PoseStream, Send, Senders
 from icub_leg_fk.ros.qos_overrides import OVERRIDABLE
 from rclpy.event_handler import PublisherEventCallbacks, UnsupportedEventTypeError
 from rclpy.node import Node
@@ -25,18 +23,6 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 _DEPTH = 10
 _TF_DEPTH = 100  # as tf2_ros.TransformBroadcaster has it
 _TF, _SKELETON = '/tf', '~/skeleton'
-
-Send = Callable[[bytes], None]
-
-
-class _ChainOutput(NamedTuple):
-    """What one chain's joint vectors become; None where nobody listens."""
-
-    chain: Chain
-    send_pose: Send | None
-    encode_pose: Callable[[int, int, Pose], bytes]
-    send_twist: Send | None
-    encode_twist: Callable[..., bytes]
 
 
 class Outputs:
@@ -54,9 +40,7 @@ class Outputs:
         self._events_supported = True
         self._configuration: Configuration | None = None
         self._stamp_now = False
-        self._chains: list[_ChainOutput | None] = []
-        self._send_tf: Send | None = None
-        self._tf_encoders: dict[tuple[int, ...], TFMessageEncoder] = {}
+        self._stream = PoseStream((), '', (), None, no_velocity)
         self._publish_skeleton: Callable[[Any], None] | None = None
 
     def configure(self, configuration: Configuration) -> None:
@@ -84,64 +68,27 @@ class Outputs:
         self._stamp_now = configuration.stamp_now
         self._connect()
 
-    def publish(self, vectors: Iterable[Ready]) -> None:
+    def publish(self, vectors: Sequence[Ready]) -> None:
         """Publish what one message has made ready."""
-        chains, send_tf = self._chains, self._send_tf
-        tf_chains: list[int] = []
-        tf_poses: list[Pose] = []
         if self._stamp_now:
             sec, nanosec = divmod(self._node.get_clock().now().nanoseconds, 1_000_000_000)
             vectors = [vector._replace(sec=sec, nanosec=nanosec) for vector in vectors]
-        for index, sec, nanosec, q, qdot in vectors:
-            output = chains[index]
-            if output is None:
-                continue
-            if output.send_pose is not None or send_tf is not None:
-                pose = output.chain.pose(q)
-                if output.send_pose is not None:
-                    output.send_pose(output.encode_pose(sec, nanosec, pose))
-                tf_chains.append(index)
-                tf_poses.append(pose)
-            if output.send_twist is not None:
-                if qdot is None:
-                    self._no_velocity(index)
-                else:
-                    twist = output.chain.twist(q, qdot)
-                    output.send_twist(output.encode_twist(sec, nanosec, twist))
-            if self._publish_skeleton is not None:
+        self._stream.send(vectors)
+        if self._publish_skeleton is not None:
+            for index, sec, nanosec, q, _ in vectors:
                 self._publish_skeleton(self._skeleton(index, q, sec, nanosec))
-        if send_tf is not None and tf_chains:
-            encoder = self._tf_encoder(tuple(tf_chains))
-            send_tf(encoder.encode(sec, nanosec, tf_poses))
 
     def _connect(self) -> None:
         """Decide what each chain's joint vectors become, by who subscribes."""
-        if self._configuration is None:
+        configuration = self._configuration
+        if configuration is None:
             return
-        prefix = self._configuration.frame_prefix
-        self._send_tf = self._sender(_TF)
-        self._tf_encoders.clear()
+        senders = [Senders(self._sender(f'~/{chain.tip}/pose'), self._sender(
+            f'~/{chain.tip}/twist')) for chain in configuration.chains]
+        self._stream = PoseStream(configuration.chains, configuration.frame_prefix, senders,
+                                  self._sender(_TF), self._no_velocity)
         self._publish_skeleton = (self._publishers[_SKELETON].publish if self._wanted(_SKELETON)
                                   else None)
-        self._chains = []
-        for chain in self._configuration.chains:
-            frame_id = prefix + chain.root_frame
-            output = _ChainOutput(
-                chain,
-                self._sender(f'~/{chain.tip}/pose'), PoseStampedEncoder(frame_id).encode,
-                self._sender(f'~/{chain.tip}/twist'), TwistStampedEncoder(frame_id).encode)
-            watched = (output.send_pose, output.send_twist, self._send_tf, self._publish_skeleton)
-            self._chains.append(output if any(watched) else None)
-
-    def _tf_encoder(self, chains: tuple[int, ...]) -> TFMessageEncoder:
-        """Return what encodes the transforms of some chains into one message."""
-        if chains not in self._tf_encoders:
-            assert self._configuration is not None
-            prefix = self._configuration.frame_prefix
-            self._tf_encoders[chains] = TFMessageEncoder([
-                (prefix + chain.root_frame, prefix + chain.tip_frame)
-                for chain in (self._configuration.chains[index] for index in chains)])
-        return self._tf_encoders[chains]
 
     def _skeleton(self, index: int, q: tuple[float, ...], sec: int, nanosec: int) -> Any:
         from icub_leg_fk.ros.skeleton import skeleton_markers

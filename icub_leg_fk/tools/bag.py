@@ -12,13 +12,13 @@ from pathlib import Path
 import re
 import sqlite3
 import time
-from typing import Any, NamedTuple
+from typing import Any
 
 from icub_leg_fk.errors import InputFileError, LegFKError, OutputFileError
-from icub_leg_fk.kinematics import Catalog, Chain
-from icub_leg_fk.ros.cdr import PoseStampedEncoder, TFMessageEncoder, TwistStampedEncoder
+from icub_leg_fk.kinematics import Catalog
 from icub_leg_fk.ros.configuration import Configuration, version_parameter
-from icub_leg_fk.ros.joint_input import JointInput, Ready
+from icub_leg_fk.ros.joint_input import JointInput
+from icub_leg_fk.ros.pose_stream import PoseStream, Send, Senders
 from icub_leg_fk.tools.bag_reading import import_rosbags, joint_connections, messages, open_bag
 from icub_leg_fk.tools.options import DEFAULT_VERSION, LEGS
 from icub_leg_fk.tools.output_file import check_target, is_bag, whole_path
@@ -137,24 +137,6 @@ def _writer(place: Path, storage: str) -> Iterator[Any]:
         file.rename(place)
 
 
-class _Output(NamedTuple):
-    """What one chain's joint vectors become."""
-
-    chain: Chain
-    frames: tuple[str, str]
-    pose_topic: str
-    encode_pose: Callable[..., bytes]
-    twist_topic: str
-    encode_twist: Callable[..., bytes]
-
-
-def _output(chain: Chain, prefix: str) -> _Output:
-    root, topic = prefix + chain.root_frame, f'{NODE}/{chain.tip}'
-    return _Output(chain, (root, prefix + chain.tip_frame),
-                   f'{topic}/pose', PoseStampedEncoder(root).encode,
-                   f'{topic}/twist', TwistStampedEncoder(root).encode)
-
-
 class _Job:
     """A recording, the poses that join it, and what becomes known on the way."""
 
@@ -170,14 +152,14 @@ class _Job:
         self._time = self._first = self._last = self._copied = 0
         self._input = JointInput(configuration.chains, configuration.joint_timeout,
                                  lambda: self._time, velocities=configuration.publish_twist)
-        self._outputs = [_output(chain, configuration.frame_prefix)
-                         for chain in configuration.chains]
+        self._children = [configuration.frame_prefix + chain.tip_frame
+                          for chain in configuration.chains]
         self._notes = [*configuration.notes, *configuration.warnings]
         self._topics: dict[str, str] = {}  # what is added: types by topic
-        for output in self._outputs:
-            self._topics[output.pose_topic] = POSE
+        for chain in configuration.chains:
+            self._topics[f'{NODE}/{chain.tip}/pose'] = POSE
             if configuration.publish_twist:
-                self._topics[output.twist_topic] = TWIST
+                self._topics[f'{NODE}/{chain.tip}/twist'] = TWIST
         if configuration.publish_tf:
             self._topics[TF_TOPIC] = TF
         self._added = dict.fromkeys(self._topics, 0)
@@ -190,11 +172,10 @@ class _Job:
         if self._configuration.publish_tf:
             transforms = [connection for connection in self._kept
                           if (connection.topic, connection.msgtype) == (TF_TOPIC, TF)]
-            frames = [output.frames[1] for output in self._outputs]
             if transforms and any(
                     frame.encode() + b'\0' in data for _, _, data in
-                    messages(self._reader, self._source, transforms) for frame in frames):
-                found.append(f'{TF_TOPIC} with {", ".join(frames)}')
+                    messages(self._reader, self._source, transforms) for frame in self._children):
+                found.append(f'{TF_TOPIC} with {", ".join(self._children)}')
                 self._own_tf = {connection.id for connection in transforms}
         if found and not replace_poses:
             raise InputFileError(f'{self._source}: has {", ".join(found)} already; '
@@ -208,11 +189,9 @@ class _Job:
         for key, value in (self._reader.storage.metadata.custom or {}).items():
             writer.set_custom_data(key, str(value))
         copies = {connection.id: self._copy(writer, connection) for connection in self._kept}
-        added = {topic: self._add(writer, topic, kind, copies)
-                 for topic, kind in self._topics.items()}
         wanted = [connection for connection in self._reader.connections
                   if connection.id in copies or connection.id in self._joint_ids]
-        write, feed, counts = writer.write, self._input.feed, self._added
+        stream, write, feed = self._stream(writer, copies), writer.write, self._input.feed
         joint_ids, own_tf = self._joint_ids, self._own_tf
         total = sum(connection.msgcount for connection in wanted) or 1
         for number, (connection, timestamp, data) in enumerate(
@@ -227,9 +206,7 @@ class _Job:
                     self._copied += 1
             if connection.id in joint_ids:
                 self._time = timestamp
-                for topic, message in self._messages(feed(data)):
-                    write(added[topic], timestamp, message)
-                    counts[topic] += 1
+                stream.send(feed(data))
             if progress is not None and number % 1000 == 0:
                 progress(number / total)
 
@@ -262,25 +239,23 @@ class _Job:
             dict(joint_input.counts), held_back, list(dict.fromkeys(self._notes)),
             (self._last - self._first) / 1e9, took)
 
-    def _messages(self, vectors: Sequence[Ready]) -> list[tuple[str, bytes]]:
-        """Return topic and bytes of what a message of joint states has made ready."""
-        made, poses = [], []
-        for index, sec, nanosec, q, qdot in vectors:
-            output = self._outputs[index]
-            pose = output.chain.pose(q)
-            poses.append(pose)
-            made.append((output.pose_topic, output.encode_pose(sec, nanosec, pose)))
-            if not self._configuration.publish_twist:
-                continue
-            if qdot is None:
-                self._input.note_no_velocity(index)
-            else:
-                made.append((output.twist_topic, output.encode_twist(
-                    sec, nanosec, output.chain.twist(q, qdot))))
-        if self._configuration.publish_tf and poses:
-            encoder = TFMessageEncoder([self._outputs[vector.chain].frames for vector in vectors])
-            made.append((TF_TOPIC, encoder.encode(sec, nanosec, poses)))
-        return made
+    def _stream(self, writer: Any, copies: Mapping[int, Any]) -> PoseStream:
+        """Return what writes the messages that are added."""
+        def sender(topic: str) -> Send | None:
+            if topic not in self._topics:
+                return None
+            connection = self._add(writer, topic, self._topics[topic], copies)
+
+            def send(data: bytes) -> None:
+                writer.write(connection, self._time, data)
+                self._added[topic] += 1
+            return send
+
+        chains = self._configuration.chains
+        senders = [Senders(sender(f'{NODE}/{chain.tip}/pose'), sender(f'{NODE}/{chain.tip}/twist'))
+                   for chain in chains]
+        return PoseStream(chains, self._configuration.frame_prefix, senders, sender(TF_TOPIC),
+                          self._input.note_no_velocity)
 
     def _copy(self, writer: Any, connection: Any) -> Any:
         """Add a connection like one of the source."""
@@ -315,9 +290,8 @@ class _Job:
     def _without_own_transforms(self, data: bytes) -> bytes | None:
         """Return a TFMessage without the frames that are added; None if nothing is left of it."""
         message = self._store.deserialize_cdr(data, TF)
-        children = {output.frames[1] for output in self._outputs}
         kept = [transform for transform in message.transforms
-                if transform.child_frame_id not in children]
+                if transform.child_frame_id not in self._children]
         if len(kept) == len(message.transforms):
             return data
         message.transforms = kept

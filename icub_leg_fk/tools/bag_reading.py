@@ -163,33 +163,28 @@ def _refuse_other_than_cdr(shown: str, encodings: Mapping[str, str]) -> None:
 
 def _mcap_summary(file: Path) -> tuple[str, dict[str, str]]:
     """Return the profile of an MCAP file and the message encodings by topic, from its summary."""
+    def string(data: bytes, at: int) -> tuple[str, int]:
+        size, = struct.unpack_from('<I', data, at)
+        return data[at + 4:at + 4 + size].decode(), at + 4 + size
+
     with file.open('rb') as stream:
         head = stream.read(4096)
-        if not head.startswith(_MCAP_MAGIC):
-            return '', {}
-        profile = _string(head, 17)[0]
         stream.seek(-37, os.SEEK_END)
-        footer = stream.read()
+        end, footer = stream.tell(), stream.read()
         start, = struct.unpack_from('<Q', footer, 9)
-        end = stream.tell() - 37
-        if footer[-8:] != _MCAP_MAGIC or not 0 < start < end:
-            return profile, {}
+        if not (head[:8] == footer[-8:] == _MCAP_MAGIC and 0 < start < end):
+            return '', {}
         stream.seek(start)
         summary = stream.read(min(end - start, 1 << 26))
     encodings: dict[str, str] = {}
     at = 0
     while at + 9 <= len(summary):
-        kind, (size,) = summary[at], struct.unpack_from('<Q', summary, at + 1)
+        kind, size = struct.unpack_from('<BQ', summary, at)
         if kind == 0x04:  # a channel: id, schema, topic, encoding
-            topic, encoding_at = _string(summary, at + 13)
-            encodings[topic] = _string(summary, encoding_at)[0]
+            topic, encoding_at = string(summary, at + 13)
+            encodings[topic], _ = string(summary, encoding_at)
         at += 9 + size
-    return profile, encodings
-
-
-def _string(data: bytes, at: int) -> tuple[str, int]:
-    size, = struct.unpack_from('<I', data, at)
-    return data[at + 4:at + 4 + size].decode(), at + 4 + size
+    return string(head, 17)[0], encodings
 
 
 def _clean(path: Path, scratch: Path) -> Path:

@@ -18,7 +18,7 @@ from icub_leg_fk.errors import LegFKError, MissingDependencyError, OutputFileErr
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.ros.configuration import SOLE_OUTLINE
-from icub_leg_fk.tools.output_file import check_target, whole_file
+from icub_leg_fk.tools.output_file import check_target, whole_path
 from icub_leg_fk.tools.recording import ChainTrack, time_span
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -86,8 +86,8 @@ def save_picture(draw: Callable[[], Figure], path: Path, *, force: bool, dpi: in
     # Without dates the same picture is the same file.
     metadata = {'svg': {'Date': None}, 'pdf': {'CreationDate': None}}.get(kind)
     try:
-        with _plain_matplotlib(), whole_file(path, force=force) as stream:
-            draw().savefig(stream, format=kind, dpi=dpi, metadata=metadata)
+        with _plain_matplotlib(), whole_path(path, force=force) as new:
+            draw().savefig(new, format=kind, dpi=dpi, metadata=metadata)
     except ValueError as error:
         raise LegFKError(f'{path}: cannot be drawn: {error}') from error
 

@@ -7,9 +7,7 @@ from contextlib import contextmanager
 import os
 from pathlib import Path
 import re
-import shutil
 import tempfile
-from typing import BinaryIO
 
 from icub_leg_fk.errors import OutputFileError
 from icub_leg_fk.tools.signals import held_signals
@@ -33,18 +31,15 @@ def whole_path(path: str | Path, *, force: bool,
     target = Path(os.path.realpath(path))
     check_target(path, force=force, may_replace=may_replace)
     try:
-        work = Path(tempfile.mkdtemp(prefix=f'.{target.name}.', suffix='.part',
-                                     dir=target.parent))
-        try:
-            new = work / target.name
+        with tempfile.TemporaryDirectory(prefix=f'.{target.name}.', suffix='.part',
+                                         dir=target.parent, ignore_cleanup_errors=True) as work:
+            new = Path(work, target.name)
             yield new
             check_target(path, force=force, may_replace=may_replace)
             with held_signals():
                 if target.is_dir():
-                    target.rename(work / 'replaced')
+                    target.rename(Path(work, 'replaced'))
                 new.replace(target)
-        finally:
-            shutil.rmtree(work, ignore_errors=True)
     except OSError as error:
         raise OutputFileError(f'{path}: {error.strerror or error}') from error
 
@@ -63,17 +58,13 @@ def check_target(path: str | Path, *, force: bool,
             raise OutputFileError(f'{path}: exists already; --force replaces it')
 
 
-@contextmanager
-def whole_file(path: str | Path, *, force: bool) -> Iterator[BinaryIO]:
-    """Give a stream to write a file with; the file is there when the block ends well."""
-    with whole_path(path, force=force) as new, new.open('wb') as stream:
-        yield stream
-
-
-def write_text(path: str | Path, text: str, *, force: bool) -> None:
-    """Write a text file, whole or not at all."""
-    with whole_file(path, force=force) as stream:
-        stream.write(text.encode())
+def write_text(path: str | None, text: str, *, force: bool) -> None:
+    """Write a text file, whole or not at all, or without a path to standard output."""
+    if path is None:
+        print(text, end='')
+        return
+    with whole_path(path, force=force) as new:
+        new.write_text(text, encoding='utf-8')
 
 
 def is_bag(path: Path) -> bool:
@@ -83,9 +74,8 @@ def is_bag(path: Path) -> bool:
     if not path.is_dir():
         return path.is_file() and path.suffix in ('.mcap', '.db3')
     entries = list(path.iterdir())
-    if any(entry.is_symlink() or not entry.is_file() for entry in entries):
-        return False
     others = [entry for entry in entries
               if not re.search(r'\.(mcap|db3)(\.zstd)?(-wal|-shm)?$', entry.name)]
-    return ([entry.name for entry in others] == ['metadata.yaml']
+    return (all(entry.is_file() and not entry.is_symlink() for entry in entries)
+            and [entry.name for entry in others] == ['metadata.yaml']
             and b'rosbag2_bagfile_information' in others[0].read_bytes())

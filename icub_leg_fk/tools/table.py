@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the kinematics file."""
-    if args.output:
+    if args.output is not None:
         check_target(args.output, force=args.force)
     urdf = Urdf.load(args.urdf)
     names = args.name or [_word(tip) for tip in args.tips]
@@ -84,12 +84,10 @@ def run(args: argparse.Namespace) -> int:
                                                          args.tolerance)]
         lines += [f'  {len(chain.links) - chain.n} fixed rows between axes that are almost '
                   'parallel'] if len(chain.links) > chain.n else []
-    if args.output:
-        write_text(args.output, text, force=args.force)
-        print('\n'.join([f'{args.output}: {", ".join(names)}', *lines]))
-    else:
-        print(text, end='')
-        print('\n'.join(lines), file=sys.stderr)
+    write_text(args.output, text, force=args.force)
+    if args.output is not None:
+        lines.insert(0, f'{args.output}: {", ".join(names)}')
+    print('\n'.join(lines), file=sys.stderr if args.output is None else sys.stdout)
     return 0
 
 

@@ -55,11 +55,7 @@ def run(args: argparse.Namespace) -> int:
     robot = args.name or ('icub' if args.kinematics_file is None else Path(catalog.file).stem)
     if not robot.isprintable():
         raise LegFKError(f'--name: found {robot!r}, allowed: printable text')
-    text = urdf_text(robot, _tables(catalog, args))
-    if args.output:
-        write_text(args.output, text, force=args.force)
-    else:
-        print(text, end='')
+    write_text(args.output, urdf_text(robot, _tables(catalog, args)), force=args.force)
     return 0
 
 
