@@ -6,16 +6,20 @@ from collections.abc import Sequence
 import os
 from pathlib import Path
 import shutil
+import struct
 import subprocess
 import sys
 from tempfile import TemporaryDirectory
 import time
 from typing import NamedTuple
 
-from bench.joint_messages import joint_names, joint_positions
+from bench.joint_messages import joint_positions, ROBOT_JOINTS
 from bench.report import ratio, Report, resident_bytes
+from icub_leg_fk.tools.bag_reading import JOINT_STATE
+from icub_leg_fk.tools.recording import write_joint_states
+import numpy as np
+from rosbags.typesys import get_typestore, Stores
 
-_JOINTS = 32
 _RATE = 1000  # Hz
 _START = 1_700_000_000 * 1_000_000_000  # ns
 _GAIT_MESSAGES = 100
@@ -35,8 +39,8 @@ def measure_bag(report: Report, quick: bool) -> None:
     jobs: dict[int, list[float]] = {1: [], 2: []}
     with TemporaryDirectory(prefix='bench_bag_') as directory:
         folder, out = Path(directory), Path(directory) / 'out'
-        bag, small = (str(write_bag(folder / f'{length}_s', length)) for length in (long, short))
-        pair = [str(write_bag(folder / name, jobs_length)) for name in ('one', 'two')]
+        bag, small = (_write_bag(folder / f'{length}_s', length) for length in (long, short))
+        pair = [_write_bag(folder / name, jobs_length) for name in ('one', 'two')]
         for _ in range(rounds):
             for name, command in {'ours': [*_OURS, bag], 'plain': [*_PLAIN, bag],
                                   'twists': [*_OURS, '--twist', bag],
@@ -47,7 +51,7 @@ def measure_bag(report: Report, quick: bool) -> None:
                                       out).seconds)
     seconds = {name: [run.seconds for run in of_name] for name, of_name in runs.items()}
     report.section(f'leg_fk bag, mcap to mcap, one core, start included: {long} s at {_RATE} Hz, '
-                   f'{_JOINTS} joints, two feet')
+                   f'{len(ROBOT_JOINTS)} joints, two feet')
     for name, label in (('ours', 'leg_fk bag'), ('twists', 'leg_fk bag --twist'),
                         ('plain', 'plain loop over rosbags')):
         report.row(f'{label}, per message', [s / long / _RATE * 1e6 for s in seconds[name]], 'us')
@@ -61,29 +65,20 @@ def measure_bag(report: Report, quick: bool) -> None:
                at_least=1.6)
 
 
-def write_bag(path: Path, seconds: int) -> Path:
+def _write_bag(path: Path, seconds: int) -> str:
     """Write an mcap bag of JointStates at 1 kHz and return its path."""
-    import numpy as np
-    from rosbags.rosbag2 import StoragePlugin, Writer
-    from rosbags.typesys import get_typestore, Stores
-    types = get_typestore(Stores.ROS2_JAZZY)
-    JointState = types.types['sensor_msgs/msg/JointState']
-    Header = types.types['std_msgs/msg/Header']
-    Time = types.types['builtin_interfaces/msg/Time']
-    names, zeros = joint_names(_JOINTS), np.zeros(_JOINTS)
-    gait = [bytearray(types.serialize_cdr(JointState(
-        Header(Time(0, 0), ''), names, np.array(joint_positions(_JOINTS, i / _GAIT_MESSAGES)),
-        zeros, zeros), 'sensor_msgs/msg/JointState')) for i in range(_GAIT_MESSAGES)]
-    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        connection = writer.add_connection('/joint_states', 'sensor_msgs/msg/JointState',
-                                           typestore=types)
-        for i in range(seconds * _RATE):
-            stamp = _START + i * 1_000_000_000 // _RATE
-            message = gait[i % _GAIT_MESSAGES]
-            sec, nanosec = divmod(stamp, 1_000_000_000)
-            message[4:12] = sec.to_bytes(4, 'little') + nanosec.to_bytes(4, 'little')
-            writer.write(connection, stamp, bytes(message))
-    return path
+    store = get_typestore(Stores.ROS2_JAZZY)
+    JointState, Header, Time = (store.types[name] for name in (
+        JOINT_STATE, 'std_msgs/msg/Header', 'builtin_interfaces/msg/Time'))
+    zeros = np.zeros(len(ROBOT_JOINTS))
+    gait = [bytes(store.serialize_cdr(JointState(
+        Header(Time(0, 0), ''), [*ROBOT_JOINTS], np.array(joint_positions(i / _GAIT_MESSAGES)),
+        zeros, zeros), JOINT_STATE)) for i in range(_GAIT_MESSAGES)]
+    stamps = range(_START, _START + seconds * 1_000_000_000, 1_000_000_000 // _RATE)
+    write_joint_states(path, (
+        (stamp, gait[i % _GAIT_MESSAGES][:4] + struct.pack('<iI', *divmod(stamp, 1_000_000_000))
+         + gait[i % _GAIT_MESSAGES][12:]) for i, stamp in enumerate(stamps)), force=False)
+    return str(path)
 
 
 def _time(command: Sequence[str], output: Path, one_core: bool = False) -> _Run:

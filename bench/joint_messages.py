@@ -16,14 +16,8 @@ ROBOT_JOINTS = (
 """The 32 joints of the simulated iCub; the last twelve are the legs'."""
 
 
-def joint_names(count: int) -> list[str]:
-    """Return `count` joint names, at least the legs' twelve, the legs last."""
-    more = [f'l_hand_finger_{i}' for i in range(count - len(ROBOT_JOINTS))]
-    return [*more, *ROBOT_JOINTS][-count:]
-
-
-def joint_positions(count: int, phase: float) -> list[float]:
-    """Return `count` joint positions inside every documented range [rad]."""
+def joint_positions(phase: float) -> list[float]:
+    """Return their positions, inside every documented range [rad]."""
     swing = 0.1 * math.sin(phase)
     legs = [0.2 + swing, 0.05, 0.02 * swing, -0.5 - swing, -0.2 + swing, 0.03]
-    return [*(swing for _ in range(count - 12)), *legs, *legs]
+    return [*(swing for _ in range(20)), *legs, *legs]

@@ -1,126 +1,191 @@
 """The node beside its references, all at 1 kHz with 32 joints and two feet.
 
 Nodes run side by side and get their messages in turns, so that whatever else the machine does
-meets all of them; every ratio is of two stretches that followed one another.
+meets all of them; every ratio is of two stretches that followed one another. Messages come from a
+process of its own, and poses to this one, which handles bytes only.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import closing
-import subprocess
-import sys
-from typing import NamedTuple
+from contextlib import closing, ExitStack
+import gc
+import math
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+import statistics
+import struct
+import time
+from typing import Any, NamedTuple
 
-from bench.load import observer, Process, robot
-from bench.report import cpu_ns, percentile, ratio, Report, resident_bytes
+from bench.joint_messages import joint_positions, ROBOT_JOINTS
+from bench.report import cpu_ns, ratio, Report
+from geometry_msgs.msg import PoseStamped, TwistStamped
+from icub_leg_fk.tools.demo_replay import DemoError, lossless, running_node
+import rclpy
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.serialization import serialize_message
+from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import JointState
 
-POSES = ('left_foot/pose', 'right_foot/pose')
-TWISTS = ('left_foot/twist', 'right_foot/twist')
-_JOINTS = 32
+FEET = ('left_foot', 'right_foot')
+_OURS, _REFERENCES = 'icub_leg_fk.ros.main', 'bench.reference_nodes'
+_NODES: dict[str, tuple[tuple[str, ...], dict[str, str]]] = {  # program, and parameters
+    'floor': ((_REFERENCES, 'floor'), {}), 'here': ((_OURS,), {}),
+    'plain': ((_REFERENCES, 'plain'), {}),
+    'here, with two twists': ((_OURS,), {'publish_twist': 'true'})}
 _RATE = 1000.0  # Hz
 _DEPTH = 1000
+_GAIT_MESSAGES = 100
 _QUIET = 5.0  # s without a message after which no more are waited for
 _SOON = 0.5  # s, likewise for tries
 _TRIES = 5  # messages sent at a time to see whether they are answered
+_STAMP, _STAMP_AT = struct.Struct('<iI'), 4  # behind the CDR encapsulation
 
 
-class Stretch(NamedTuple):
-    """CPU time per message, and message sent to pose received, of all poses [us]."""
+class _Node(NamedTuple):
+    namespace: str
+    pid: int
+    arrivals: list[list[int]]  # of the poses of either foot, and of their twists [ns]
 
-    cpu: float
-    latencies: list[float]
 
-
-class NodeProcess:
-    """A node in a process and namespace of its own: ours, or a reference node by its name."""
-
-    def __init__(self, namespace: str, name: str = 'ours', outputs: Sequence[str] = POSES,
-                 parameters: Sequence[str] = ()) -> None:
-        self.joint_topic = f'/{namespace}/joint_states'
-        self.topics = [f'/{namespace}/foot_pose_publisher/{output}' for output in outputs]
-        module = ['icub_leg_fk.ros.main'] if name == 'ours' else ['bench.reference_nodes', name]
-        words = ['--ros-args', '-r', f'__ns:=/{namespace}', '--log-level', 'fatal']
-        if name == 'ours':
-            joints = f'qos_overrides.{self.joint_topic}.subscription'
-            for parameter in (*parameters, f'{joints}.reliability:=reliable',
-                              f'{joints}.depth:={_DEPTH}',
-                              *(f'qos_overrides.{topic}.publisher.depth:={_DEPTH}'
-                                for topic in self.topics)):
-                words += ['-p', parameter]
-        self._process = subprocess.Popen([sys.executable, '-m', *module, *words])
-        self.pid = self._process.pid
-
-    def close(self) -> None:
-        """End the process."""
-        self._process.terminate()
-        try:
-            self._process.wait(timeout=5.0)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+class _Stretch(NamedTuple):
+    cpu: float  # us per message
+    latency: float  # us, median from message sent to pose received
+    lost: int
 
 
 def measure_node(report: Report, quick: bool) -> None:
-    """Add CPU, latency and memory."""
-    turns, messages = (2, 50) if quick else (12, 1000)
-    nodes: dict[str, NodeProcess] = {}
-    with closing(Process(robot)) as sender, closing(Process(observer)) as receiver:
-        try:
-            nodes |= {'floor': NodeProcess('floor', 'floor'), 'here': NodeProcess('here'),
-                      'plain': NodeProcess('plain', 'plain'),
-                      'here, with two twists': NodeProcess(
-                          'twists', 'ours', (*POSES, *TWISTS), ('publish_twist:=true',))}
-            _match(sender, receiver, nodes.values())
-            stretches: dict[str, list[Stretch]] = {name: [] for name in nodes}
-            for turn in range(turns):  # forth and back, so that none is always first
-                for name in nodes if turn % 2 == 0 else reversed(nodes):
-                    stretches[name].append(_stretch(sender, receiver, nodes[name], messages))
-            resident = {name: resident_bytes(node.pid) / 1e6 for name, node in nodes.items()}
-        finally:
-            for node in nodes.values():
-                node.close()
-    cpu = {name: [turn.cpu for turn in of_name] for name, of_name in stretches.items()}
-    p50, p99 = ({name: [percentile(turn.latencies, percent) for turn in of_name]
-                 for name, of_name in stretches.items()} for percent in (50, 99))
-    report.section(f'node: CPU per message, two feet, {_RATE:.0f} Hz, {_JOINTS} joints')
-    for name in nodes:
-        report.row(f'CPU, {name}', cpu[name], 'us')
+    """Add CPU and latency."""
+    turns, count = (2, 50) if quick else (12, 1000)
+    stretches: dict[str, list[_Stretch]] = {name: [] for name in _NODES}
+    with ExitStack() as stack:
+        load = stack.enter_context(closing(_Load()))
+        nodes = {name: _start(stack, load, f'/bench_{i}', *spec)
+                 for i, (name, spec) in enumerate(_NODES.items())}
+        for turn in range(turns):  # forth and back, so that none is always first
+            for name in nodes if turn % 2 == 0 else reversed(nodes):
+                before = cpu_ns(nodes[name].pid)
+                latencies, lost = load.send(nodes[name], _RATE, count, _QUIET)
+                cpu_us = (cpu_ns(nodes[name].pid) - before) / 1000 / count
+                stretches[name].append(
+                    _Stretch(cpu_us, statistics.median(latencies or [math.nan]), lost))
+    cpu, p50 = ({name: [getattr(stretch, figure) for stretch in of_name]
+                 for name, of_name in stretches.items()} for figure in ('cpu', 'latency'))
+    report.section(f'node: CPU per message, two feet, {_RATE:.0f} Hz, {len(ROBOT_JOINTS)} joints')
+    for name, readings in cpu.items():
+        report.row(f'CPU, {name}', readings, 'us')
+        if lost := sum(stretch.lost for stretch in stretches[name]):
+            report.note(f'{name}: {lost} of its messages were lost, expect odd figures')
     report.row('CPU, here / floor', ratio(cpu['here'], cpu['floor']), 'x', at_most=1.3)
     report.row('CPU, here / plain', ratio(cpu['here'], cpu['plain']), 'x', at_most=0.32)
-    report.section('node: latency, JointState sent to PoseStamped received; resident size')
+    report.section('node: median latency, JointState sent to PoseStamped received')
     for name in ('floor', 'here', 'plain'):
         report.row(f'p50, {name}', p50[name], 'us')
-        report.row(f'p99, {name}', p99[name], 'us')
-        report.row(f'resident, {name}', [resident[name]], 'MB')
     report.row('p50, here / floor', ratio(p50['here'], p50['floor']), 'x', at_most=1.2)
 
 
-def _match(sender: Process, receiver: Process, nodes: Sequence[NodeProcess]) -> None:
-    """Wait until messages reach the nodes and their poses reach the observer."""
-    for topic in (topic for node in nodes for topic in node.topics):
-        receiver('watch', topic)
-    for node in nodes:
-        if not sender('match', node.joint_topic):
-            raise RuntimeError(f'no node has subscribed to {node.joint_topic}')
-        for _ in range(100):
-            sender('send', node.joint_topic, _JOINTS, 100.0, _TRIES)
-            answers = [receiver('take', topic, _TRIES, _SOON) for topic in node.topics]
-            if all(answers):
+def _start(stack: ExitStack, load: _Load, namespace: str, program: tuple[str, ...],
+           parameters: dict[str, str]) -> _Node:
+    """Start a node, and wait until messages reach it and everything of it comes back."""
+    if program == (_OURS,):
+        parameters = parameters | lossless(namespace, FEET, _DEPTH)
+    # In sessions of their own Linux would share out the cores among the nodes differently.
+    pid, check = stack.enter_context(
+        running_node(namespace, parameters, program, own_session=False))
+    node = _Node(namespace, pid, load.watch(namespace, 'publish_twist' in parameters))
+    for _ in range(100):
+        check()
+        _, lost = load.send(node, 100.0, _TRIES, _SOON)
+        if not lost:
+            return node
+    raise DemoError(f'no answer from the node in {namespace}')
+
+
+class _Load:
+    """Sends joint states from a process of its own, and receives what nodes make of them."""
+
+    def __init__(self) -> None:
+        context = get_context('spawn')
+        self._connection, theirs = context.Pipe()
+        self._robot = context.Process(target=_robot, args=(theirs,), daemon=True)
+        self._robot.start()
+        self._node, self._qos = _node('observer')
+        self._executor = EventsExecutor()
+        self._executor.add_node(self._node)
+
+    def watch(self, namespace: str, twists: bool) -> list[list[int]]:
+        """Subscribe to the poses, and twists, of a node; return where their arrivals are told."""
+        arrivals: list[list[int]] = []
+        for name, kind in (('pose', PoseStamped), ('twist', TwistStamped))[:1 + twists]:
+            for foot in FEET:
+                arrived: list[int] = []
+                arrivals.append(arrived)
+                self._node.create_subscription(
+                    kind, f'{namespace}/foot_pose_publisher/{foot}/{name}',
+                    lambda data, arrived=arrived: arrived.append(time.time_ns()), self._qos,
+                    raw=True)
+        return arrivals
+
+    def send(self, node: _Node, rate: float, count: int, quiet: float) -> tuple[list[float], int]:
+        """Send messages through a node; return the latencies of its poses [us] and its losses."""
+        for arrived in node.arrivals:
+            arrived.clear()
+        self._connection.send((f'{node.namespace}/joint_states', rate, count))
+        seen, since = -1, time.monotonic()
+        gc.disable()
+        while not self._connection.poll() or time.monotonic() - since < quiet:
+            self._executor.spin_once(timeout_sec=0.02)
+            if (now_seen := sum(map(len, node.arrivals))) != seen:
+                seen, since = now_seen, time.monotonic()
+            if seen == count * len(node.arrivals):
                 break
-        else:
-            raise RuntimeError(f'nothing from {node.topics}')
-        # What still comes is no answer to what is sent later; one wait takes all in.
-        for i, topic in enumerate(node.topics):
-            receiver('take', topic, sys.maxsize, 0.0 if i else _SOON)
+        gc.enable()
+        sent = self._connection.recv()
+        # Paired by their order, since ready-made poses carry no stamp of theirs.
+        return ([(at - by) / 1000 for arrived in node.arrivals[:len(FEET)]
+                 for by, at in zip(sent, arrived)],
+                max(count - len(arrived) for arrived in node.arrivals))
+
+    def close(self) -> None:
+        """End the other process."""
+        self._robot.terminate()
+        self._robot.join()
+        self._node.destroy_node()
+        rclpy.try_shutdown()
 
 
-def _stretch(sender: Process, receiver: Process, node: NodeProcess, count: int) -> Stretch:
-    """Send messages through a node and return what was seen of them."""
-    before = cpu_ns(node.pid)
-    sent = sender('send', node.joint_topic, _JOINTS, _RATE, count)
-    received = [receiver('take', topic, count, _QUIET) for topic in node.topics]
-    cpu = (cpu_ns(node.pid) - before) / 1000 / count
-    # Messages and poses are paired by their order: ready-made poses carry no stamp of theirs.
-    return Stretch(cpu, [(arrived - at) / 1000 for arrivals in received
-                         for at, arrived in zip(sent, arrivals, strict=True)])
+def _robot(connection: Connection) -> None:
+    """Publish JointStates, as told: topic, rate [Hz] and count; tell the times [ns].
+
+    It waits busily between messages, as a robot's computer is busy: on a machine that falls asleep
+    meanwhile, waking it up would be most of the cost of every node.
+    """
+    node, qos = _node('robot')
+    gait = [bytearray(serialize_message(JointState(
+        name=ROBOT_JOINTS, velocity=[0.0] * len(ROBOT_JOINTS), effort=[0.0] * len(ROBOT_JOINTS),
+        position=joint_positions(2 * math.pi * i / _GAIT_MESSAGES))))
+        for i in range(_GAIT_MESSAGES)]
+    publishers: dict[str, Any] = {}
+    gc.disable()
+    while True:
+        topic, rate, count = connection.recv()
+        if topic not in publishers:
+            publishers[topic] = node.create_publisher(JointState, topic, qos)
+        times = []
+        due = time.perf_counter()
+        for i in range(count):
+            while time.perf_counter() < due:
+                pass
+            due += 1.0 / rate
+            message, now = gait[i % _GAIT_MESSAGES], time.time_ns()
+            _STAMP.pack_into(message, _STAMP_AT, *divmod(now, 1_000_000_000))
+            publishers[topic].publish(bytes(message))
+            times.append(now)
+        connection.send(times)
+
+
+def _node(name: str) -> tuple[Node, QoSProfile]:
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    return Node(name, namespace='bench'), QoSProfile(depth=_DEPTH)

@@ -57,9 +57,9 @@ def plain(node: Node, publishers: list[Publisher]) -> None:
 
 
 def main() -> None:
-    """Run the node that the first argument names until SIGTERM."""
+    """Run the node that the first argument names until SIGINT."""
     stop = Event()
-    signal.signal(signal.SIGTERM, lambda number, frame: stop.set())
+    signal.signal(signal.SIGINT, lambda number, frame: stop.set())
     rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
     node = Node('foot_pose_publisher')
     set_up, executor = {'floor': (floor, EventsExecutor()),

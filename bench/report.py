@@ -72,12 +72,6 @@ def ratio(ours: Sequence[float], reference: Sequence[float]) -> list[float]:
     return [a / b for a, b in zip(ours, reference, strict=True)]
 
 
-def percentile(values: Sequence[float], percent: float) -> float:
-    """Return the value below which `percent` of the values lie."""
-    ordered = sorted(values)
-    return ordered[min(len(ordered) - 1, int(len(ordered) * percent / 100))]
-
-
 def cpu_ns(pid: int) -> int:
     """Return the CPU time that all threads of a process have used [ns]."""
     return time.clock_gettime_ns((~pid << 3) | 2)  # as clock_getcpuclockid(3) builds the id

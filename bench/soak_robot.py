@@ -31,12 +31,15 @@ SECOND = 1_000_000_000  # ns
 VERSIONS, FOOT_FRAMES = ('v1', 'v2_5', 'v3'), ('dh', 'sole')
 CHECKED = 50  # every so many poses one is computed anew
 _PERIOD = 0.001  # s from message to message
-_FROM_FAULT_TO_FAULT = 2.0  # s
+_BETWEEN_FAULTS = 2.0  # s
 _CATCH_UP = 0.01  # s; what is later than that is not made up for
 _STAMP = struct.Struct('<iI')
 _STAMP_AT = 4
 _POSE = struct.Struct('<7d')
 _BOTH, _LEFT, _RIGHT, _NONE = (True, True), (True, False), (False, True), (False, False)
+
+Turn = tuple[Any, ...]
+"""A message to send: its kind, whether either foot must answer, and a step of time [ns] if odd."""
 
 
 class Promise(NamedTuple):
@@ -70,7 +73,7 @@ class SoakRobot:
         self._certain = False
         self._answered_from = 0
         self._fault = 'start'
-        self._turn = self._ordinary()
+        self._turns = self._all_turns()
         catalog = Catalog.load()
         self._chains = {foot: [catalog.chain(chain, version, frame) for version in VERSIONS
                                for frame in FOOT_FRAMES] for foot, chain in FEET.items()}
@@ -78,8 +81,6 @@ class SoakRobot:
         self._kept = dict.fromkeys(FEET, 0)
         self.latencies: list[float] = []
         self.sent = self.lost = self.unexpected = self.twists = 0
-        self._coming = itertools.cycle(self._all_faults())
-        self._next_fault = 0.0
         self.faults: Counter[str] = Counter()
         self.complaints: list[str] = []
         for foot in FEET:
@@ -100,14 +101,9 @@ class SoakRobot:
         due = time.monotonic()
         end = due + seconds
         while (now := time.monotonic()) < end:
-            if now >= self._next_fault:
-                self._next_fault = now + _FROM_FAULT_TO_FAULT
-                self._fault, fault = next(self._coming)
-                self.faults[self._fault] += 1
-                self._turn = fault()
             if now >= due:
                 due = max(due + _PERIOD, now - _CATCH_UP)
-                self._send(*next(self._turn))
+                self._send(*next(self._turns))
             self._executor.spin_once(timeout_sec=max(0.0, due - time.monotonic()))
 
     def finish(self, seconds: float = 5.0) -> None:
@@ -124,7 +120,7 @@ class SoakRobot:
         """Send until both feet answer; return whether they do."""
         end = time.monotonic() + seconds
         while not self._certain and time.monotonic() < end:
-            self._send(*next(self._turn))
+            self._send('plain', _BOTH)
             self._executor.spin_once(timeout_sec=0.05)
         return self._certain
 
@@ -172,54 +168,46 @@ class SoakRobot:
 
     def _check(self, foot: str, promise: Promise, data: bytes) -> None:
         """Check that a pose is that of some configuration that has been set."""
-        q = joint_positions(12, 2 * math.pi * promise.sample / SAMPLES)[:6]
+        q = joint_positions(2 * math.pi * promise.sample / SAMPLES)[20:26]
         pose = _POSE.unpack(data[-_POSE.size:])
         if not any(pose == chain.pose(q) for chain in self._chains[foot]):
             self.complaints.append(f'{foot}: pose of no configuration during {promise.fault}')
 
-    # What follows are endless sequences of (kind of message, feet promised[, step of time]).
+    def _all_turns(self) -> Iterator[Turn]:
+        """Yield for ever what is sent: fault after fault, and good messages between them."""
+        good: Turn = ('plain', _BOTH)
+        faults: dict[str, list[Turn] | Callable[[], None]] = {
+            'NaN burst': 100 * [('nan', _RIGHT)],
+            'reordered names': 100 * [('reordered', _BOTH), good],
+            'loop': [('plain', _BOTH, -10 * SECOND)],
+            'publisher restart': self._restart,
+            'version change': self._change('version', itertools.cycle(VERSIONS)),
+            'short, doubled, empty': 100 * [('short', _NONE), ('doubled', _NONE),
+                                            ('empty', _NONE), good],
+            'leg by leg': 100 * [('left', _LEFT), ('right', _RIGHT, -300_000)],
+            'foot frame change': self._change('foot_frame', itertools.cycle(FOOT_FRAMES)),
+            'malformed bytes': 100 * [('malformed', _NONE), good],
+            'subscriber comes or goes': self._subscriber,
+            'frame prefix change': self._change('frame_prefix', itertools.cycle(('a/', ''))),
+            'other joints': 100 * [('others', _NONE), good],
+            'chains change': self._change('chains', itertools.cycle(
+                (['right_leg', 'left_leg'], ['left_leg', 'right_leg']))),
+            'skeletons on or off': self._change('publish_markers', itertools.cycle((True, False))),
+            'twists on or off': self._change('publish_twist', itertools.cycle((True, False))),
+            'kinematics file change': self._change(
+                'kinematics_file', itertools.cycle((Catalog.load().file, ''))),
+        }
+        for self._fault, fault in itertools.cycle(faults.items()):
+            self.faults[self._fault] += 1
+            if callable(fault):
+                fault()
+            else:
+                yield from fault
+            end = time.monotonic() + _BETWEEN_FAULTS
+            while time.monotonic() < end:
+                yield good
 
-    def _ordinary(self) -> Iterator[tuple[Any, ...]]:
-        while True:
-            yield 'plain', _BOTH
-
-    def _burst(self, *turns: tuple[Any, ...]) -> Callable[[], Iterator[tuple[Any, ...]]]:
-        def burst() -> Iterator[tuple[Any, ...]]:
-            for _ in range(100):
-                yield from turns
-            yield from self._ordinary()
-        return burst
-
-    def _all_faults(self) -> list[tuple[str, Callable[[], Iterator[tuple[Any, ...]]]]]:
-        ordinary = ('plain', _BOTH)
-        return [
-            ('NaN burst', self._burst(('nan', _RIGHT))),
-            ('reordered names', self._burst(('reordered', _BOTH), ordinary)),
-            ('loop', self._loop),
-            ('publisher restart', self._restart),
-            ('version change', self._change('version', itertools.cycle(VERSIONS))),
-            ('short, doubled, empty', self._burst(('short', _NONE), ('doubled', _NONE),
-                                                  ('empty', _NONE), ordinary)),
-            ('leg by leg', self._burst(('left', _LEFT), ('right', _RIGHT, -300_000))),
-            ('foot frame change', self._change('foot_frame', itertools.cycle(FOOT_FRAMES))),
-            ('malformed bytes', self._burst(('malformed', _NONE), ordinary)),
-            ('subscriber comes or goes', self._subscriber),
-            ('frame prefix change', self._change('frame_prefix', itertools.cycle(('a/', '')))),
-            ('other joints', self._burst(('others', _NONE), ordinary)),
-            ('chains change', self._change('chains', itertools.cycle(
-                (['right_leg', 'left_leg'], ['left_leg', 'right_leg'])))),
-            ('skeletons on or off', self._change('publish_markers',
-                                                 itertools.cycle((True, False)))),
-            ('twists on or off', self._change('publish_twist', itertools.cycle((True, False)))),
-            ('kinematics file change', self._change(
-                'kinematics_file', itertools.cycle((Catalog.load().file, '')))),
-        ]
-
-    def _loop(self) -> Iterator[tuple[Any, ...]]:
-        yield 'plain', _BOTH, -10 * SECOND
-        yield from self._ordinary()
-
-    def _restart(self) -> Iterator[tuple[Any, ...]]:
+    def _restart(self) -> None:
         """Leave, and come back as another publisher; nothing is certain until it is answered."""
         self._publisher.wait_for_all_acked(Duration(seconds=5))
         self._node.destroy_publisher(self._publisher)
@@ -227,28 +215,22 @@ class SoakRobot:
         self._certain = False
         self._answered_from = max(self._kept.values())
         self._publisher = self._node.create_publisher(JointState, 'joint_states', self._qos)
-        return self._ordinary()
 
-    def _subscriber(self) -> Iterator[tuple[Any, ...]]:
+    def _subscriber(self) -> None:
         if self._bystander is None:
             self._bystander = self._node.create_subscription(
                 PoseStamped, 'foot_pose_publisher/left_foot/pose', lambda data: None, 10, raw=True)
         else:
             self._node.destroy_subscription(self._bystander)
             self._bystander = None
-        return self._ordinary()
 
-    def _change(self, name: str, values: Iterator[Any]) -> Callable[
-            [], Iterator[tuple[Any, ...]]]:
+    def _change(self, name: str, values: Iterator[Any]) -> Callable[[], None]:
         def note(future: Any) -> None:
             if not future.result().result.successful:
                 self.complaints.append(f'{name} refused: {future.result().result.reason}')
 
-        def change() -> Iterator[tuple[Any, ...]]:
-            self._client.set_parameters_atomically(
-                [Parameter(name, value=next(values))]).add_done_callback(note)
-            return self._ordinary()
-        return change
+        return lambda: self._client.set_parameters_atomically(
+            [Parameter(name, value=next(values))]).add_done_callback(note)
 
 
 def _messages(order: random.Random) -> dict[str, list[bytearray]]:
@@ -262,7 +244,7 @@ def _messages(order: random.Random) -> dict[str, list[bytearray]]:
     reordered = order.sample(range(32), 32)
     knee = names.index('l_knee')
     for sample in range(SAMPLES):
-        q = joint_positions(32, 2 * math.pi * sample / SAMPLES)
+        q = joint_positions(2 * math.pi * sample / SAMPLES)
         add('plain', names, q)
         add('malformed', names, q)
         add('nan', names, [*q[:knee], math.nan, *q[knee + 1:]])

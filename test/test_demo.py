@@ -130,14 +130,13 @@ def test_recording_is_played_in_its_own_timing():
 @pytest.mark.parametrize(('version', 'foot_frame'), [('v1', 'dh'), ('v2_5', 'sole')])
 def test_poses_received_are_those_of_the_chains(version, foot_frame):
     """In the order of the messages, equal to the plain product of the DH matrices."""
-    from node_harness import LOSSLESS
     namespace = '/leg_fk_test'
-    parameters = {name.format(ns=namespace): str(value) for name, value in LOSSLESS.items()}
-    parameters |= {'version': version, 'foot_frame': foot_frame}
+    parameters = {'version': version, 'foot_frame': foot_frame,
+                  **replays.lossless(namespace, TIPS, 1000)}
     catalog = Catalog.load()
     gait = walk(catalog, version, seconds=0.5)
     with replays.Replay(gait, namespace, TIPS) as replay, \
-            replays.running_node(namespace, parameters) as check:
+            replays.running_node(namespace, parameters) as (_, check):
         replay.wait_for_node(check)
         replay.play(lambda elapsed: None, 0.1, check)
     for answers, name, q in zip(replay.answers, ('left_leg', 'right_leg'),
@@ -173,7 +172,7 @@ def test_nohup_is_respected():
 
 def test_node_that_refuses_its_parameters_is_one_line():
     with pytest.raises(replays.DemoError, match=r'exit status 1: .*v9.*v2_5'), \
-            replays.running_node('/leg_fk_test', {'version': 'v9'}) as check:
+            replays.running_node('/leg_fk_test', {'version': 'v9'}) as (_, check):
         wait_until(check)
 
 

@@ -11,19 +11,25 @@ import sys
 
 from icub_leg_fk.kinematics import Catalog, Chain, config_file
 from icub_leg_fk.tools import options
-from icub_leg_fk.tools.bag_reading import import_rosbags, JOINT_STATE
+from icub_leg_fk.tools.bag_reading import import_rosbags
 from icub_leg_fk.tools.demo_replay import (
     Answers,
     DemoError,
     DEPTH,
+    lossless,
     Replay,
     running_node,
     stay_on_this_machine,
 )
 from icub_leg_fk.tools.drawing import check_output, feet_figure, save_picture
-from icub_leg_fk.tools.output_file import check_target, is_bag, whole_path
+from icub_leg_fk.tools.output_file import check_target, is_bag
 from icub_leg_fk.tools.plot import default_instants
-from icub_leg_fk.tools.recording import ChainTrack, JointRecording, read_csv
+from icub_leg_fk.tools.recording import (
+    ChainTrack,
+    JointRecording,
+    read_csv,
+    write_joint_states,
+)
 from icub_leg_fk.tools.signals import stop_on_signals
 import numpy as np
 
@@ -95,7 +101,7 @@ def run(args: argparse.Namespace) -> int:
                          picture, force=force)
             print(f'picture       {picture}', flush=True)
         if whole and args.save:
-            _save(args.save, args.force, replay)
+            write_joint_states(args.save, replay.sent, force=args.force)
             print(f'bag           {args.save}', flush=True)
     return status
 
@@ -103,15 +109,11 @@ def run(args: argparse.Namespace) -> int:
 def _play(namespace: str, recording: JointRecording, chains: Sequence[Chain],
           args: argparse.Namespace) -> tuple[Replay, bool]:
     """Play the recording; return what came of it, and whether it was played to its end."""
-    # What shall not be lost must be reliable, and may wait while the machine does other things.
-    joint_states = f'qos_overrides.{namespace}/joint_states.subscription'
+    tips = tuple(chain.tip for chain in chains)
     parameters = {'version': args.version, 'foot_frame': args.foot_frame,
-                  f'{joint_states}.reliability': 'reliable', f'{joint_states}.depth': str(DEPTH)}
-    for chain in chains:
-        pose = f'{namespace}/foot_pose_publisher/{chain.tip}/pose'
-        parameters[f'qos_overrides.{pose}.publisher.depth'] = str(DEPTH)
-    with Replay(recording, namespace, tuple(chain.tip for chain in chains)) as replay, \
-            running_node(namespace, parameters) as check:
+                  **lossless(namespace, tips, DEPTH)}
+    with Replay(recording, namespace, tips) as replay, \
+            running_node(namespace, parameters) as (_, check):
         replay.wait_for_node(check)
         seconds = float(recording.times[-1] - recording.times[0])
         with LiveTable(replay.answers, seconds, chains[0].root_frame) as table:
@@ -127,18 +129,6 @@ def _track(chain: Chain, answers: Answers, recording: JointRecording) -> ChainTr
     track, came = recording.track(chain), np.isfinite(answers.latencies)
     return ChainTrack(chain, track.times[came] - recording.times[0], track.positions[came],
                       answers.poses[came])
-
-
-def _save(path: Path, force: bool, replay: Replay) -> None:
-    """Write the joint states as they were sent, whole or not at all."""
-    rosbag2, typesys = import_rosbags()
-    with whole_path(path, force=force, may_replace=is_bag) as place, \
-            rosbag2.Writer(place, version=rosbag2.Writer.VERSION_LATEST,
-                           storage_plugin=rosbag2.StoragePlugin.MCAP) as writer:
-        store = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
-        topic = writer.add_connection('/joint_states', JOINT_STATE, typestore=store)
-        for stamp, data in replay.sent:
-            writer.write(topic, stamp, data)
 
 
 def conclude(answers: Sequence[Answers], times: Sequence[float], whole: bool) -> int:

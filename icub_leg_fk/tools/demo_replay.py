@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from typing import Any
+from typing import Any, IO
 
 from icub_leg_fk.errors import LegFKError, MissingDependencyError
 from icub_leg_fk.kinematics.rotation import Array
@@ -61,31 +61,32 @@ def stay_on_this_machine() -> str:
     return os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % _HIGHEST_DOMAIN))
 
 
-@contextmanager
-def running_node(namespace: str, parameters: dict[str, str]) -> Iterator[Callable[[], None]]:
-    """Run `foot_pose_publisher` in a process of its own.
+def lossless(namespace: str, tips: Iterable[str], depth: int) -> dict[str, str]:
+    """Return parameters by which the node loses nothing when a process is held up."""
+    joint_states = f'qos_overrides.{namespace}/joint_states.subscription'
+    return {f'{joint_states}.reliability': 'reliable', f'{joint_states}.depth': str(depth)} | {
+        f'qos_overrides.{namespace}/foot_pose_publisher/{tip}/pose.publisher.depth': str(depth)
+        for tip in tips}
 
-    Gives what raises `DemoError` once the node has stopped by itself.
+
+@contextmanager
+def running_node(namespace: str, parameters: Mapping[str, str],
+                 program: Sequence[str] = ('icub_leg_fk.ros.main',), own_session: bool = True
+                 ) -> Iterator[tuple[int, Callable[[], None]]]:
+    """Run `foot_pose_publisher`, or another module, in a process of its own.
+
+    In a session of its own Ctrl-C does not reach it. Gives its process id, and what raises
+    `DemoError` once it has stopped by itself.
     """
     words = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
-    command = [sys.executable, '-m', 'icub_leg_fk.ros.main', '--ros-args', '-r',
-               f'__ns:={namespace}', *words]
+    command = [sys.executable, '-m', *program, '--ros-args', '-r', f'__ns:={namespace}', *words]
     process: subprocess.Popen[bytes] | None = None
-
-    def check() -> None:
-        if process is not None and (status := process.poll()) is not None:
-            log.seek(0)
-            said = log.read().decode(errors='replace').strip() or 'it said nothing'
-            raise DemoError(f'the node stopped with exit status {status}: '
-                            f'{said.splitlines()[-1].strip()}')
-
     with tempfile.TemporaryFile() as log:
         try:
             with held_signals():  # the node must not get away between its start and the next line
-                # A session of its own: Ctrl-C reaches the demonstration, which stops the node.
                 process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log,
-                                           stderr=log, start_new_session=True)
-            yield check
+                                           stderr=log, start_new_session=own_session)
+            yield process.pid, partial(_check_runs, process, log)
         finally:
             with held_signals():
                 if process is not None:
@@ -95,6 +96,14 @@ def running_node(namespace: str, parameters: dict[str, str]) -> Iterator[Callabl
                     except subprocess.TimeoutExpired:
                         process.kill()
                         process.wait()
+
+
+def _check_runs(process: subprocess.Popen[bytes], log: IO[bytes]) -> None:
+    if (status := process.poll()) is not None:
+        log.seek(0)
+        said = log.read().decode(errors='replace').strip() or 'it said nothing'
+        raise DemoError(f'the node stopped with exit status {status}: '
+                        f'{said.splitlines()[-1].strip()}')
 
 
 class Replay:

@@ -17,8 +17,16 @@ from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.ros.configuration import DEFAULT_TIMEOUT
 from icub_leg_fk.ros.joint_input import JointInput
-from icub_leg_fk.tools.bag_reading import joint_connections, messages, open_bag
+from icub_leg_fk.tools.bag_reading import (
+    DEFAULT_TOPIC,
+    import_rosbags,
+    joint_connections,
+    JOINT_STATE,
+    messages,
+    open_bag,
+)
 from icub_leg_fk.tools.options import LARGEST, number
+from icub_leg_fk.tools.output_file import is_bag, whole_path
 import numpy as np
 
 TIMES = ('time', 'Time', 'timestamp')
@@ -164,3 +172,16 @@ def _rows(file: str, reader: Any, joints: Sequence[str]) -> Iterator[list[float]
         yield numbers
     if before == -math.inf:
         raise InputFileError(f'{file}: no rows; allowed: at least one after the header')
+
+
+def write_joint_states(path: str | Path, sent: Iterable[tuple[int, bytes]], *, force: bool
+                       ) -> None:
+    """Write serialized JointStates, by stamp [ns], as a bag, whole or not at all."""
+    rosbag2, typesys = import_rosbags()
+    store = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
+    with whole_path(path, force=force, may_replace=is_bag) as place, \
+            rosbag2.Writer(place, version=rosbag2.Writer.VERSION_LATEST,
+                           storage_plugin=rosbag2.StoragePlugin.MCAP) as writer:
+        topic = writer.add_connection(DEFAULT_TOPIC, JOINT_STATE, typestore=store)
+        for stamp, data in sent:
+            writer.write(topic, stamp, data)
