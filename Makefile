@@ -77,10 +77,9 @@ $(VENV)/.docs: $(VENV)/.python $(SETTINGS)
 	@touch $@
 
 $(VENV)/.bench: $(VENV)/.ros
-	@for library in pin roboticstoolbox-python; do \
-	  $(PYTHON) -m pip install --quiet $$library || \
-	    echo "make: without $$library, which cannot be installed here" >&2; \
-	done; touch $@
+	@$(PYTHON) -m pip install --quiet pin || \
+	  echo 'make: without Pinocchio (pin), which cannot be installed here' >&2
+	@touch $@
 
 $(VENV)/.python:
 	@for python in $(PYTHONS); do \

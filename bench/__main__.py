@@ -7,6 +7,7 @@ from importlib import import_module
 import os
 import sys
 
+from bench.report import Report
 from icub_leg_fk.errors import LegFKError
 
 PARTS = {'start': 'kinematics_bench', 'kinematics': 'kinematics_bench', 'node': 'node_bench',
@@ -28,19 +29,17 @@ def main() -> int:
         parser.error(f'found part {", ".join(sorted(unknown))}, allowed: {", ".join(PARTS)}')
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
-
-    from bench.report import Report
     report = Report()
     if (load := os.getloadavg()[0]) > _QUIET_LOAD:
-        report.note(f'this machine is busy (load {load:.1f}): expect wide spreads')
+        report.note(f'  this machine is busy (load {load:.1f}): expect wide spreads')
     for part in (part for part in PARTS if part in args.parts):
         try:
             measure = getattr(import_module(f'bench.{PARTS[part]}'), f'measure_{part}')
             measure(report, args.quick)
         except (ImportError, LegFKError) as error:  # a library, or the machine's mood
-            report.section(f'{part}: not measured: {error}')
+            report.note(f'\n{part}: not measured: {error}')
     print(f'\n{report.verdict()}')
-    return int(args.check and not all(promise.is_kept for promise in report.promises))
+    return int(args.check and bool(report.missed))
 
 
 if __name__ == '__main__':

@@ -14,7 +14,8 @@ import time
 from typing import NamedTuple
 
 from bench.joint_messages import joint_positions, ROBOT_JOINTS
-from bench.report import ratio, Report, resident_bytes
+from bench.report import ratio, Report
+from icub_leg_fk.errors import LegFKError
 from icub_leg_fk.tools.bag_reading import JOINT_STATE
 from icub_leg_fk.tools.recording import write_joint_states
 import numpy as np
@@ -50,7 +51,7 @@ def measure_bag(report: Report, quick: bool) -> None:
                 readings.append(_time([*_OURS, *pair, '--jobs', str(count), '--out-dir'],
                                       out).seconds)
     seconds = {name: [run.seconds for run in of_name] for name, of_name in runs.items()}
-    report.section(f'leg_fk bag, mcap to mcap, one core, start included: {long} s at {_RATE} Hz, '
+    report.note(f'\nleg_fk bag, mcap to mcap, one core, start included: {long} s at {_RATE} Hz, '
                    f'{len(ROBOT_JOINTS)} joints, two feet')
     for name, label in (('ours', 'leg_fk bag'), ('twists', 'leg_fk bag --twist'),
                         ('plain', 'plain loop over rosbags')):
@@ -87,18 +88,11 @@ def _time(command: Sequence[str], output: Path, one_core: bool = False) -> _Run:
     if one_core:  # inherited by the process
         os.sched_setaffinity(0, {min(cores)})
     began = time.perf_counter()
-    process = subprocess.Popen([*command, str(output)], stdout=subprocess.DEVNULL,
-                               stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen([*command, str(output)], stdout=subprocess.DEVNULL)
     os.sched_setaffinity(0, cores)
-    peak = 0
-    while process.poll() is None:
-        peak = max(peak, resident_bytes(process.pid, 'VmHWM:'))
-        try:
-            process.wait(timeout=0.02)
-        except subprocess.TimeoutExpired:
-            continue
+    _, status, usage = os.wait4(process.pid, 0)
+    if status:
+        raise LegFKError(f'{" ".join(command)} ended with {os.waitstatus_to_exitcode(status)}')
     seconds = time.perf_counter() - began
-    if process.returncode != 0:
-        raise RuntimeError(f'{" ".join(command)}: {process.communicate()[1].strip()}')
     shutil.rmtree(output)
-    return _Run(seconds, peak / 1e6)
+    return _Run(seconds, usage.ru_maxrss * 1024 / 1e6)

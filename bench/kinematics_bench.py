@@ -1,4 +1,4 @@
-"""One pose and many poses beside Pinocchio and roboticstoolbox; `leg_fk pose`'s start."""
+"""One pose and many poses beside Pinocchio; `leg_fk pose`'s start."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _MANY = 100_000
 _TOLERANCE = 1e-9  # m, and each rotation entry; so that nobody is timed on another robot
 
 One = Callable[[Any], Any]
-"""Computes one pose with its quaternion, or None to be told of the matrix of it."""
+"""Computes one pose with its quaternion."""
 
 
 def measure_start(report: Report, quick: bool) -> None:
@@ -31,7 +31,7 @@ def measure_start(report: Report, quick: bool) -> None:
             began = time.perf_counter()
             subprocess.run([sys.executable, *words], check=True, stdout=subprocess.DEVNULL)
             seconds[name].append(time.perf_counter() - began)
-    report.section('the command from the shell')
+    report.note('\nthe command from the shell')
     for name, readings in seconds.items():
         report.row(name, readings, 's')
     ours, imports = seconds.values()
@@ -43,24 +43,30 @@ def measure_kinematics(report: Report, quick: bool) -> None:
     chain = Catalog.load().chain('left_leg', 'v2_5', 'dh')
     Q = np.random.default_rng(5).uniform(chain.lower, chain.upper, (_MANY, chain.n))
     few = Q[:100] if quick else Q[:1000]
-    report.section('kinematics: left_leg v2_5, pose with quaternion')
+    report.note('\nkinematics: left_leg v2_5, pose with quaternion')
     ways: dict[str, tuple[One, Any]] = {'here': (chain.pose, few.tolist())}
-    for name, make, count in (('Pinocchio', _pinocchio, len(few)),
-                              ('roboticstoolbox', _roboticstoolbox, 20)):
-        try:
-            ways[name] = make(chain, few), list(few[:count])
-        except ImportError as error:
-            report.note(f'{name}: not measured: {error}')
+    try:
+        ways['Pinocchio'] = _pinocchio(chain, few), list(few)
+    except ImportError as error:
+        report.note(f'  Pinocchio: not measured: {error}')
     one: dict[str, list[float]] = {name: [] for name in ways}
     many, loop = [], []
     out = np.empty((len(few), 7))
+
+    def call(pose: One, vectors: Any) -> None:
+        for q in vectors:
+            pose(q)
+
+    def fill(pose: One, vectors: Any) -> None:
+        for i, q in enumerate(vectors):
+            out[i] = pose(q)
+
     for _ in range(3 if quick else _READINGS):
         for name, (pose, vectors) in ways.items():
-            one[name].append(_microseconds(len(vectors), _each, pose, vectors))
+            one[name].append(_microseconds(len(few), call, pose, vectors))
         many.append(_microseconds(len(Q), chain.poses, Q))
         if 'Pinocchio' in ways:
-            pose, vectors = ways['Pinocchio']
-            loop.append(_microseconds(len(few), _fill, out, pose, vectors))
+            loop.append(_microseconds(len(few), fill, *ways['Pinocchio']))
     for name, readings in one.items():
         report.row(f'one pose, {name}', readings, 'us')
     report.row('many poses, each, here', many, 'us')
@@ -70,27 +76,11 @@ def measure_kinematics(report: Report, quick: bool) -> None:
         report.row('many poses, loop over Pinocchio / here', ratio(loop, many), 'x', at_least=8.0)
 
 
-def _each(pose: One, vectors: Any) -> None:
-    for q in vectors:
-        pose(q)
-
-
-def _fill(out: Any, pose: One, vectors: Any) -> None:
-    for i, q in enumerate(vectors):
-        out[i] = pose(q)
-
-
 def _microseconds(count: int, work: Callable[..., object], *arguments: Any) -> float:
     """Return what each of so many things costs that are worked on."""
     began = time.perf_counter()
     work(*arguments)
     return (time.perf_counter() - began) / count * 1e6
-
-
-def _check(chain: Chain, q: Any, T: Any) -> None:
-    error = float(np.abs(np.asarray(T) - chain.forward(q)).max())
-    if error > _TOLERANCE:
-        raise AssertionError(f'computes another robot, {error:.1e} off')
 
 
 def _pinocchio(chain: Chain, Q: Any) -> One:
@@ -109,18 +99,6 @@ def _pinocchio(chain: Chain, Q: Any) -> One:
         pin.forwardKinematics(model, data, q)
         return pin.SE3ToXYZQUAT(pin.updateFramePlacement(model, data, tip))
     pose(Q[0])
-    _check(chain, Q[0], data.oMf[tip].homogeneous)
-    return pose
-
-
-def _roboticstoolbox(chain: Chain, Q: Any) -> One:
-    import roboticstoolbox as rtb
-    from spatialmath import SE3, UnitQuaternion
-    robot = rtb.DHRobot([rtb.RevoluteDH(a=link.a, d=link.d, alpha=link.alpha, offset=link.offset)
-                         for link in chain.links], base=SE3(chain.T_root_0))
-    _check(chain, Q[0], robot.fkine(Q[0]).A)
-
-    def pose(q: Any) -> Any:
-        T = robot.fkine(q)
-        return T.t, UnitQuaternion(T)
+    if np.abs(data.oMf[tip].homogeneous - chain.forward(Q[0])).max() > _TOLERANCE:
+        raise AssertionError('Pinocchio computes another robot')
     return pose

@@ -73,14 +73,14 @@ def measure_node(report: Report, quick: bool) -> None:
                     _Stretch(cpu_us, statistics.median(latencies or [math.nan]), lost))
     cpu, p50 = ({name: [getattr(stretch, figure) for stretch in of_name]
                  for name, of_name in stretches.items()} for figure in ('cpu', 'latency'))
-    report.section(f'node: CPU per message, two feet, {_RATE:.0f} Hz, {len(ROBOT_JOINTS)} joints')
+    report.note(f'\nnode: CPU per message, two feet, {_RATE:.0f} Hz, {len(ROBOT_JOINTS)} joints')
     for name, readings in cpu.items():
         report.row(f'CPU, {name}', readings, 'us')
         if lost := sum(stretch.lost for stretch in stretches[name]):
-            report.note(f'{name}: {lost} of its messages were lost, expect odd figures')
+            report.note(f'  {name}: {lost} of its messages were lost, expect odd figures')
     report.row('CPU, here / floor', ratio(cpu['here'], cpu['floor']), 'x', at_most=1.3)
     report.row('CPU, here / plain', ratio(cpu['here'], cpu['plain']), 'x', at_most=0.32)
-    report.section('node: median latency, JointState sent to PoseStamped received')
+    report.note('\nnode: median latency, JointState sent to PoseStamped received')
     for name in ('floor', 'here', 'plain'):
         report.row(f'p50, {name}', p50[name], 'us')
     report.row('p50, here / floor', ratio(p50['here'], p50['floor']), 'x', at_most=1.2)

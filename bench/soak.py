@@ -76,7 +76,7 @@ def _soak(pid: int, minutes: float) -> list[str]:
     growth = max(window['memory'] for window in warm) - warm[0]['memory']
     slowdown = late / max(early, 1e-9)
     cpu, p50 = (statistics.median(window[key] for window in warm) for key in ('cpu', 'p50'))
-    print(f'\n{windows[-1]["time"] / 60:.1f} min: {robot.sent} messages, {robot.kept} poses, '
+    print(f'\n{windows[-1]["time"] / 60:.1f} min: {robot.sent} messages, {sum(robot.kept.values())} poses, '
           f'{robot.twists} twists, {sum(robot.faults.values())} faults of '
           f'{len(robot.faults)} kinds\nlost {robot.lost}, unexpected {robot.unexpected}; memory '
           f'grew by {growth:.2f} MB after the first minute\nlatency p50 {p50:.0f} us, late to '

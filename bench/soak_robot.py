@@ -33,8 +33,7 @@ CHECKED = 50  # every so many poses one is computed anew
 _PERIOD = 0.001  # s from message to message
 _BETWEEN_FAULTS = 2.0  # s
 _CATCH_UP = 0.01  # s; what is later than that is not made up for
-_STAMP = struct.Struct('<iI')
-_STAMP_AT = 4
+_STAMP, _STAMP_AT = struct.Struct('<iI'), 4
 _POSE = struct.Struct('<7d')
 _BOTH, _LEFT, _RIGHT, _NONE = (True, True), (True, False), (False, True), (False, False)
 
@@ -78,23 +77,16 @@ class SoakRobot:
         self._chains = {foot: [catalog.chain(chain, version, frame) for version in VERSIONS
                                for frame in FOOT_FRAMES] for foot, chain in FEET.items()}
         self._promised: dict[str, deque[Promise]] = {foot: deque() for foot in FEET}
-        self._kept = dict.fromkeys(FEET, 0)
+        self.kept = dict.fromkeys(FEET, 0)
         self.latencies: list[float] = []
         self.sent = self.lost = self.unexpected = self.twists = 0
         self.faults: Counter[str] = Counter()
         self.complaints: list[str] = []
         for foot in FEET:
-            self._node.create_subscription(
-                PoseStamped, f'foot_pose_publisher/{foot}/pose', self._receiver(foot), self._qos,
-                raw=True)
-            self._node.create_subscription(
-                TwistStamped, f'foot_pose_publisher/{foot}/twist', self._count_twist, 10,
-                raw=True)
-
-    @property
-    def kept(self) -> int:
-        """Poses that arrived as promised."""
-        return sum(self._kept.values())
+            for name, kind, receive in (('pose', PoseStamped, self._receiver(foot)),
+                                        ('twist', TwistStamped, self._count_twist)):
+                self._node.create_subscription(
+                    kind, f'foot_pose_publisher/{foot}/{name}', receive, self._qos, raw=True)
 
     def run(self, seconds: float) -> None:
         """Send for some time [s]."""
@@ -150,12 +142,12 @@ class SoakRobot:
                 return
             while (promise := open_ones.popleft()).stamp != stamp:
                 self._miss(foot, promise)
-            self._kept[foot] += 1
-            if self._kept[foot] % 10 == 0:
+            self.kept[foot] += 1
+            if self.kept[foot] % 10 == 0:
                 self.latencies.append((now - promise.sent) / 1000)
-            if self._kept[foot] % CHECKED == 0:
+            if self.kept[foot] % CHECKED == 0:
                 self._check(foot, promise, data)
-            self._certain = self._certain or min(self._kept.values()) > self._answered_from
+            self._certain = self._certain or min(self.kept.values()) > self._answered_from
         return receive
 
     def _count_twist(self, data: bytes) -> None:
@@ -213,7 +205,7 @@ class SoakRobot:
         self._node.destroy_publisher(self._publisher)
         self.finish()
         self._certain = False
-        self._answered_from = max(self._kept.values())
+        self._answered_from = max(self.kept.values())
         self._publisher = self._node.create_publisher(JointState, 'joint_states', self._qos)
 
     def _subscriber(self) -> None:
@@ -236,23 +228,17 @@ class SoakRobot:
 def _messages(order: random.Random) -> dict[str, list[bytearray]]:
     """Return the serialized gait in every kind of message."""
     kinds: dict[str, list[bytearray]] = {}
-
-    def add(kind: str, names: list[str], positions: list[float]) -> None:
-        kinds.setdefault(kind, []).append(bytearray(serialize_message(
-            JointState(name=names, position=positions, velocity=[0.1] * len(positions)))))
     names = list(ROBOT_JOINTS)
     reordered = order.sample(range(32), 32)
     knee = names.index('l_knee')
     for sample in range(SAMPLES):
         q = joint_positions(2 * math.pi * sample / SAMPLES)
-        add('plain', names, q)
-        add('malformed', names, q)
-        add('nan', names, [*q[:knee], math.nan, *q[knee + 1:]])
-        add('reordered', [names[i] for i in reordered], [q[i] for i in reordered])
-        add('short', names, q[:-1])
-        add('doubled', [*names, 'l_knee'], [*q, 0.0])
-        add('empty', names, [])
-        add('left', names[20:26], q[20:26])
-        add('right', names[26:], q[26:])
-        add('others', names[:20], q[:20])
+        for kind, of, positions in (
+                ('plain', names, q), ('malformed', names, q), ('short', names, q[:-1]),
+                ('nan', names, [*q[:knee], math.nan, *q[knee + 1:]]), ('empty', names, []),
+                ('reordered', [names[i] for i in reordered], [q[i] for i in reordered]),
+                ('doubled', [*names, 'l_knee'], [*q, 0.0]), ('others', names[:20], q[:20]),
+                ('left', names[20:26], q[20:26]), ('right', names[26:], q[26:])):
+            kinds.setdefault(kind, []).append(bytearray(serialize_message(
+                JointState(name=of, position=positions, velocity=[0.1] * len(positions)))))
     return kinds
