@@ -52,7 +52,7 @@ def measure_bag(report: Report, quick: bool) -> None:
                                       out).seconds)
     seconds = {name: [run.seconds for run in of_name] for name, of_name in runs.items()}
     report.note(f'\nleg_fk bag, mcap to mcap, one core, start included: {long} s at {_RATE} Hz, '
-                   f'{len(ROBOT_JOINTS)} joints, two feet')
+                f'{len(ROBOT_JOINTS)} joints, two feet')
     for name, label in (('ours', 'leg_fk bag'), ('twists', 'leg_fk bag --twist'),
                         ('plain', 'plain loop over rosbags')):
         report.row(f'{label}, per message', [s / long / _RATE * 1e6 for s in seconds[name]], 'us')

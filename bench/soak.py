@@ -76,11 +76,12 @@ def _soak(pid: int, minutes: float) -> list[str]:
     growth = max(window['memory'] for window in warm) - warm[0]['memory']
     slowdown = late / max(early, 1e-9)
     cpu, p50 = (statistics.median(window[key] for window in warm) for key in ('cpu', 'p50'))
-    print(f'\n{windows[-1]["time"] / 60:.1f} min: {robot.sent} messages, {sum(robot.kept.values())} poses, '
-          f'{robot.twists} twists, {sum(robot.faults.values())} faults of '
-          f'{len(robot.faults)} kinds\nlost {robot.lost}, unexpected {robot.unexpected}; memory '
-          f'grew by {growth:.2f} MB after the first minute\nlatency p50 {p50:.0f} us, late to '
-          f'early {slowdown:.2f}; CPU {cpu:.0f} us per message',
+    print(f'\n{windows[-1]["time"] / 60:.1f} min: {robot.sent} messages, '
+          f'{sum(robot.kept.values())} poses, {robot.twists} twists, '
+          f'{sum(robot.faults.values())} faults of {len(robot.faults)} kinds\n'
+          f'lost {robot.lost}, unexpected {robot.unexpected}; memory grew by {growth:.2f} MB '
+          f'after the first minute\nlatency p50 {p50:.0f} us, late to early {slowdown:.2f}; CPU '
+          f'{cpu:.0f} us per message',
           *(f'  {text}' for text in robot.complaints[:10]), sep='\n')
     return [text for text, failed in {
         f'{robot.lost} poses lost': robot.lost,
