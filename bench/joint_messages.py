@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 
 ROBOT_JOINTS = (
-    *(f'torso_{axis}' for axis in ('pitch', 'roll', 'yaw')),
-    *(f'neck_{axis}' for axis in ('pitch', 'roll', 'yaw')),
+    *(f'{part}_{axis}' for part in ('torso', 'neck') for axis in ('pitch', 'roll', 'yaw')),
     *(f'{side}_{joint}' for side in 'lr' for joint in (
         'shoulder_pitch', 'shoulder_roll', 'shoulder_yaw', 'elbow', 'wrist_prosup', 'wrist_pitch',
         'wrist_yaw')),

@@ -1,5 +1,6 @@
 """`leg_fk demo`: the node in its own process over DDS, from outside."""
 
+from contextlib import closing
 import fcntl
 import os
 from pathlib import Path
@@ -135,7 +136,7 @@ def test_poses_received_are_those_of_the_chains(version, foot_frame):
                   **replays.lossless(namespace, TIPS, 1000)}
     catalog = Catalog.load()
     gait = walk(catalog, version, seconds=0.5)
-    with replays.Replay(gait, namespace, TIPS) as replay, \
+    with closing(replays.Replay(gait, namespace, TIPS)) as replay, \
             replays.running_node(namespace, parameters) as (_, check):
         replay.wait_for_node(check)
         replay.play(lambda elapsed: None, 0.1, check)

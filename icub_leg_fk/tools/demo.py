@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from contextlib import closing
 import os
 from pathlib import Path
 import shutil
@@ -112,7 +113,7 @@ def _play(namespace: str, recording: JointRecording, chains: Sequence[Chain],
     tips = tuple(chain.tip for chain in chains)
     parameters = {'version': args.version, 'foot_frame': args.foot_frame,
                   **lossless(namespace, tips, DEPTH)}
-    with Replay(recording, namespace, tips) as replay, \
+    with closing(Replay(recording, namespace, tips)) as replay, \
             running_node(namespace, parameters) as (_, check):
         replay.wait_for_node(check)
         seconds = float(recording.times[-1] - recording.times[0])

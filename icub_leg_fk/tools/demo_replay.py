@@ -107,38 +107,38 @@ def _check_runs(process: subprocess.Popen[bytes], log: IO[bytes]) -> None:
 
 
 class Replay:
-    """Publishes joint states in their own timing and collects poses; use as a context manager.
+    """Publishes joint states in their own timing and collects poses, until it is closed.
 
     `answers` has what has come, per tip, and `sent` stamp [ns] and bytes of what was published.
     """
 
-    def __init__(self, recording: JointRecording, namespace: str, tips: tuple[str, ...]) -> None:
-        self._recording, self._namespace = recording, namespace
-        count = len(recording.times)
-        self.answers = [Answers(tip, np.full((count, 7), np.nan), np.full(count, np.nan))
-                        for tip in tips]
-        self.sent: list[tuple[int, bytes]] = []
-        self._awaited: dict[int, tuple[int, float]] = {}  # by stamp: which message, sent when
-        self._found: set[str] = set()
-
-    def __enter__(self) -> Replay:
+    def __init__(self, recording: JointRecording, namespace: str, tips: Sequence[str]) -> None:
         try:
             from geometry_msgs.msg import PoseStamped
             import rclpy
             from rclpy.context import Context
             from rclpy.executors import SingleThreadedExecutor
+            from rclpy.serialization import serialize_message
             from rclpy.signals import SignalHandlerOptions
             from sensor_msgs.msg import JointState
         except ImportError as error:
             raise MissingDependencyError(
                 f'the demonstration needs rclpy ({error}): source ROS 2, or pip install '
                 'icub_leg_fk[ros]') from error
+        count = len(recording.times)
+        self.answers = [Answers(tip, np.full((count, 7), np.nan), np.full(count, np.nan))
+                        for tip in tips]
+        self.sent: list[tuple[int, bytes]] = []
+        self._recording = recording
+        self._awaited: dict[int, tuple[int, float]] = {}  # by stamp: which message, sent when
+        self._found: set[str] = set()
+        self._joint_state, self._serialize = JointState, serialize_message
         self._context = Context()
         try:
             rclpy.init(args=[], context=self._context,
                        signal_handler_options=SignalHandlerOptions.NO)
             self._node = rclpy.create_node(
-                'leg_fk_demo', namespace=self._namespace, context=self._context,
+                'leg_fk_demo', namespace=namespace, context=self._context,
                 use_global_arguments=False, enable_rosout=False, start_parameter_services=False)
         except (RuntimeError, ValueError) as error:  # what rclpy raises for what rcl refuses
             raise DemoError(f'ROS 2 cannot be started: {" ".join(str(error).split())}') from error
@@ -149,9 +149,9 @@ class Replay:
             self._node.create_subscription(
                 PoseStamped, f'foot_pose_publisher/{answers.tip}/pose',
                 partial(self._take, answers), DEPTH)
-        return self
 
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
+        """Leave the ROS graph."""
         self._executor.shutdown()
         self._node.destroy_node()
         self._context.try_shutdown()
@@ -162,7 +162,7 @@ class Replay:
         To that end, single messages are sent, which do not count, until each tip has answered
         one. `check` is called again and again, and raises if there is no hope.
         """
-        deadline, next_probe = time.monotonic() + _DISCOVERY_TIMEOUT, 0.0
+        deadline = time.monotonic() + _DISCOVERY_TIMEOUT
         while len(self._found) < len(self.answers):
             check()
             now = time.monotonic()
@@ -170,10 +170,9 @@ class Replay:
                 hint = '' if loopback_is_up() else f': {LOOPBACK_IS_DOWN}'
                 raise DemoError(f'the node was not found over DDS in {_DISCOVERY_TIMEOUT:g} s'
                                 f'{hint}')
-            if now >= next_probe:
-                next_probe = now + _PROBE_PERIOD
-                self._publish(time.time_ns(), _PROBE)
-            self._spin(0.02)
+            self._publish(time.time_ns(), _PROBE)
+            while time.monotonic() < now + _PROBE_PERIOD:
+                self._spin(0.02)
 
     def play(self, on_time: Callable[[float], None], period: float, check: Callable[[], None]
              ) -> None:
@@ -197,11 +196,11 @@ class Replay:
             if self.sent:
                 stamp = max(stamp, self.sent[-1][0] + 1)
             self.sent.append((stamp, self._publish(stamp, index)))
-        wanted = len(times) * len(self.answers)
         arrived, deadline = -1, 0.0
-        while (arrived_now := sum(answers.arrived for answers in self.answers)) < wanted:
-            if arrived_now > arrived:
-                arrived, deadline = arrived_now, time.monotonic() + _LAST_POSE_TIMEOUT
+        while (now_arrived := sum(a.arrived for a in self.answers)) < len(times) * len(
+                self.answers):
+            if now_arrived > arrived:
+                arrived, deadline = now_arrived, time.monotonic() + _LAST_POSE_TIMEOUT
             if time.monotonic() > deadline:
                 break
             check()
@@ -214,8 +213,7 @@ class Replay:
             self._executor.spin_once(timeout_sec=seconds)
 
     def _take(self, answers: Answers, message: Any) -> None:
-        now = time.monotonic()
-        stamp = message.header.stamp
+        now, stamp = time.monotonic(), message.header.stamp
         index, sent = self._awaited.get(stamp.sec * 1_000_000_000 + stamp.nanosec, (None, now))
         if index == _PROBE:
             self._found.add(answers.tip)
@@ -228,13 +226,10 @@ class Replay:
             answers.newest = index
 
     def _publish(self, stamp: int, index: int) -> bytes:
-        from rclpy.serialization import serialize_message
-        from sensor_msgs.msg import JointState
-
-        message = JointState(name=list(self._recording.joint_names),
-                             position=self._recording.positions[max(index, 0)].tolist())
+        message = self._joint_state(name=list(self._recording.joint_names),
+                                    position=self._recording.positions[max(index, 0)].tolist())
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
-        data = bytes(serialize_message(message))
+        data = bytes(self._serialize(message))
         self._awaited[stamp] = index, time.monotonic()
         with held_signals():
             self._publisher.publish(data)
