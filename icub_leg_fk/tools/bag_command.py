@@ -74,27 +74,21 @@ def run(args: argparse.Namespace) -> int:
     tasks = _tasks(args)
     settings = {name: getattr(args, name) for name in _AS_THEY_ARE}
     settings['chain_versions'] = options.own_versions(args, args.chains)
+    shows_progress = len(tasks) == 1 and sys.stderr is not None and sys.stderr.isatty()
+    settings['progress'] = _show_share if shows_progress else None
+    failed = False
     with stop_on_signals():
-        if len(tasks) == 1:
-            on_terminal = sys.stderr is not None and sys.stderr.isatty()
-            try:
-                summary = add_foot_poses(*tasks[0], **settings,
-                                         progress=_show_share if on_terminal else None)
-            finally:
-                if on_terminal:
-                    print('\r\033[K', end='', file=sys.stderr, flush=True)
-            print('\n'.join(_summary_lines(summary)))
-            return 0
-        failed = False
-        for (source, _), outcome in _outcomes(tasks, settings, args.jobs):
+        for (source, _), outcome in _outcomes(tasks, settings, min(args.jobs, len(tasks))):
+            if shows_progress:
+                print('\r\033[K', end='', file=sys.stderr, flush=True)
             if isinstance(outcome, Summary):
                 print('\n'.join(_summary_lines(outcome)), flush=True)
-            else:
-                failed = True
-                line = ' '.join(str(outcome).split())
-                named = line if line.startswith(str(source)) else f'{source}: {line}'
-                print(f'leg_fk: error: {named}', file=sys.stderr, flush=True)
-        return 2 if failed else 0
+                continue
+            failed = True
+            line = ' '.join(str(outcome).split())
+            named = '' if line.startswith(str(source)) or len(tasks) == 1 else f'{source}: '
+            print(f'leg_fk: error: {named}{line}', file=sys.stderr, flush=True)
+    return 2 if failed else 0
 
 
 def _show_share(share: float) -> None:
@@ -111,7 +105,7 @@ def _outcomes(tasks: Sequence[tuple[Path, Path]], settings: Mapping[str, Any], j
             except LegFKError as error:
                 yield task, error
         return
-    pool = ProcessPoolExecutor(min(jobs, len(tasks)), get_context('spawn'), _begin_worker)
+    pool = ProcessPoolExecutor(jobs, get_context('spawn'), _begin_worker)
     try:
         futures = {pool.submit(add_foot_poses, *task, **settings): task for task in tasks}
         for future in as_completed(futures):
@@ -156,12 +150,12 @@ def _tasks(args: argparse.Namespace) -> list[tuple[Path, Path]]:
     return tasks
 
 
-def _name(bag: Path, storage: str | None) -> str:
+def _name(bag: Path, storage: str) -> str:
     """Return the name of the new bag: that of the old one, with the ending of its storage."""
-    stem, ending = os.path.splitext(os.path.basename(os.path.abspath(bag)))
-    if storage and ending in STORAGES:
-        return stem + next(ending for ending, name in STORAGES.items() if name == storage)
-    return stem + ending
+    path = Path(os.path.abspath(bag))
+    endings = {name: ending for ending, name in STORAGES.items()}
+    return (path.with_suffix(endings[storage]) if storage and path.suffix in STORAGES else path
+            ).name
 
 
 def _positive_integer(text: str) -> int:

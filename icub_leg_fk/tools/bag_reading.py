@@ -84,22 +84,22 @@ def joint_connections(reader: Any, path: str | Path, topic: str | None) -> list[
 
     If None, the topic is `/joint_states`, or the only one there is.
     """
-    known = sorted({connection.topic for connection in reader.connections
-                    if connection.msgtype == JOINT_STATE})
-    name = topic or (DEFAULT_TOPIC if DEFAULT_TOPIC in known or len(known) != 1 else known[0])
-    found = [connection for connection in reader.connections
-             if (connection.topic, connection.msgtype) == (name, JOINT_STATE)]
-    if not found:
+    connections = [connection for connection in reader.connections
+                   if connection.msgtype == JOINT_STATE]
+    known = sorted({connection.topic for connection in connections})
+    name = topic or (known[0] if len(known) == 1 else DEFAULT_TOPIC)
+    if name not in known:
         there = (f'--joint-topic can be {", ".join(known)}' if known
                  else f'it has no topic of type {JOINT_STATE}')
         raise InputFileError(f'{path}: no joint states on {name}; {there}')
-    return found
+    return [connection for connection in connections if connection.topic == name]
 
 
 def unreadable(path: str | Path, error: Exception) -> InputFileError:
     """Return the one line on a recording that rosbags cannot read, with what mends it."""
     path = Path(path)
     reason = (' '.join(str(error).split()) or type(error).__name__).rstrip('.')
+    mend = _MEND.get(path.suffix, 'allowed: a rosbag2 directory, or a .mcap or .db3 file')
     if path.is_dir():
         endings = {suffix for entry in path.iterdir() for suffix in entry.suffixes} & _MEND.keys()
         if not endings:
@@ -111,39 +111,36 @@ def unreadable(path: str | Path, error: Exception) -> InputFileError:
             mend = (f'give its file alone, or let `ros2 bag reindex {path}` write one'
                     if endings == {'.db3'} else '`mcap recover` mends its file, then '
                     f'`ros2 bag reindex {path}` writes one')
-    else:
-        mend = _MEND.get(path.suffix, 'allowed: a rosbag2 directory, or a .mcap or .db3 file')
     return InputFileError(f'{path}: cannot be read: {reason}; {mend}')
 
 
 def _look_first(path: Path, shown: str) -> None:
     """Refuse what is no recording of ROS 2, or not all of one, where rosbags would not say so."""
+    def wrong(reason: str) -> InputFileError:
+        return InputFileError(f'{shown}: {reason}')
+
     if not path.exists():
-        raise InputFileError(f'{shown}: there is no such file or directory')
+        raise wrong('there is no such file or directory')
     files = [path]
     if path.is_dir():
         files = sorted(entry for entry in path.iterdir() if entry.suffix in _MEND)
+    elif path.suffix == '.zstd':
+        raise wrong('is a compressed file alone; give its directory, or decompress it: zstd -d')
     else:
         with path.open('rb') as stream:
             if stream.read(7) == b'#ROSBAG':
-                raise InputFileError(f'{shown}: is a ROS 1 bag; `rosbags-convert` makes a ROS 2 '
-                                     'recording of it')
-        if path.suffix == '.zstd':
-            raise InputFileError(f'{shown}: is a compressed file alone; give its directory, or '
-                                 'decompress it: zstd -d')
+                raise wrong('is a ROS 1 bag; `rosbags-convert` makes a ROS 2 recording of it')
     encodings: dict[str, str] = {}
     for file in files:
         log = file.with_name(f'{file.name}-wal')
         if file.suffix == '.db3' and log.is_file() and log.stat().st_size:
-            raise InputFileError(f'{shown}: {log.name} holds messages that are not in {file.name} '
-                                 'yet; this brings them in: sqlite3 '
-                                 f"{file.name} 'PRAGMA wal_checkpoint(TRUNCATE)'")
+            raise wrong(f'{log.name} holds messages that are not in {file.name} yet; this brings '
+                        f"them in: sqlite3 {file.name} 'PRAGMA wal_checkpoint(TRUNCATE)'")
         # Of damaged files rosbags will say what is wrong.
         with suppress(OSError, struct.error, UnicodeDecodeError, IndexError):
             profile, found = _mcap_summary(file) if file.suffix == '.mcap' else ('', {})
             if 'ros1' in (profile, *found.values()):
-                raise InputFileError(f'{shown}: is an MCAP file of ROS 1 messages; allowed: of '
-                                     'ROS 2')
+                raise wrong('is an MCAP file of ROS 1 messages; allowed: of ROS 2')
             encodings |= found
     with suppress(Exception):
         bag = yaml.safe_load((path / METADATA).read_text(encoding='utf-8'))

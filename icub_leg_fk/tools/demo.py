@@ -11,26 +11,14 @@ import shutil
 import sys
 
 from icub_leg_fk.kinematics import Catalog, Chain, config_file
-from icub_leg_fk.tools import options
+from icub_leg_fk.tools import demo_replay, options
+from icub_leg_fk.tools import recording as recordings
 from icub_leg_fk.tools.bag_reading import import_rosbags
-from icub_leg_fk.tools.demo_replay import (
-    Answers,
-    DemoError,
-    DEPTH,
-    lossless,
-    Replay,
-    running_node,
-    stay_on_this_machine,
-)
+from icub_leg_fk.tools.demo_replay import Answers, Replay
 from icub_leg_fk.tools.drawing import check_output, feet_figure, save_picture
 from icub_leg_fk.tools.output_file import check_target, is_bag
 from icub_leg_fk.tools.plot import default_instants
-from icub_leg_fk.tools.recording import (
-    ChainTrack,
-    JointRecording,
-    read_csv,
-    write_joint_states,
-)
+from icub_leg_fk.tools.recording import ChainTrack, JointRecording
 from icub_leg_fk.tools.signals import stop_on_signals
 import numpy as np
 
@@ -77,18 +65,19 @@ def run(args: argparse.Namespace) -> int:
         check_target(args.save, force=args.force, may_replace=is_bag)
     catalog = Catalog.load()
     chains = [catalog.chain(name, args.version, args.foot_frame) for name in options.LEGS]
-    recording = read_csv(args.recording or config_file('examples/synthetic_walk.csv'),
-                         [name for chain in chains for name in chain.joint_names])
+    recording = recordings.read_csv(
+        args.recording or config_file('examples/synthetic_walk.csv'),
+        [name for chain in chains for name in chain.joint_names])
     if args.seconds is not None:
         recording = recording.first(args.seconds)
-    domain, namespace = stay_on_this_machine(), f'/leg_fk_demo_{os.getpid()}'
+    domain, namespace = demo_replay.stay_on_this_machine(), f'/leg_fk_demo_{os.getpid()}'
     print(f'iCub legs {args.version}: {len(recording.times)} JointState messages to '
           f'foot_pose_publisher, poses back over DDS\n'
           f'(this machine only, ROS_DOMAIN_ID {domain}, namespace {namespace})\n', flush=True)
     with stop_on_signals():
         try:
             replay, whole = _play(namespace, recording, chains, args)
-        except DemoError as error:
+        except demo_replay.DemoError as error:
             print(f'leg_fk: error: {error}', file=sys.stderr)
             return 1
         status = conclude(replay.answers, recording.times[:len(replay.sent)].tolist(), whole)
@@ -102,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
                          picture, force=force)
             print(f'picture       {picture}', flush=True)
         if whole and args.save:
-            write_joint_states(args.save, replay.sent, force=args.force)
+            recordings.write_joint_states(args.save, replay.sent, force=args.force)
             print(f'bag           {args.save}', flush=True)
     return status
 
@@ -112,9 +101,9 @@ def _play(namespace: str, recording: JointRecording, chains: Sequence[Chain],
     """Play the recording; return what came of it, and whether it was played to its end."""
     tips = tuple(chain.tip for chain in chains)
     parameters = {'version': args.version, 'foot_frame': args.foot_frame,
-                  **lossless(namespace, tips, DEPTH)}
+                  **demo_replay.lossless(namespace, tips, demo_replay.DEPTH)}
     with closing(Replay(recording, namespace, tips)) as replay, \
-            running_node(namespace, parameters) as (_, check):
+            demo_replay.running_node(namespace, parameters) as (_, check):
         replay.wait_for_node(check)
         seconds = float(recording.times[-1] - recording.times[0])
         with LiveTable(replay.answers, seconds, chains[0].root_frame) as table:

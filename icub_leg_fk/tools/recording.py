@@ -17,14 +17,7 @@ from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.ros.configuration import DEFAULT_TIMEOUT
 from icub_leg_fk.ros.joint_input import JointInput
-from icub_leg_fk.tools.bag_reading import (
-    DEFAULT_TOPIC,
-    import_rosbags,
-    joint_connections,
-    JOINT_STATE,
-    messages,
-    open_bag,
-)
+from icub_leg_fk.tools import bag_reading
 from icub_leg_fk.tools.options import LARGEST, number
 from icub_leg_fk.tools.output_file import is_bag, whole_path
 import numpy as np
@@ -85,8 +78,9 @@ def read_bag(path: Path, chains: Sequence[Chain], topic: str | None
     positions = [array('d') for _ in chains]
     now = 0  # when the bag received the present message [ns], for one without a stamp
     joint_input = JointInput(chains, DEFAULT_TIMEOUT, lambda: now)
-    with open_bag(path) as reader:
-        for _, received, data in messages(reader, path, joint_connections(reader, path, topic)):
+    with bag_reading.open_bag(path) as reader:
+        connections = bag_reading.joint_connections(reader, path, topic)
+        for _, received, data in bag_reading.messages(reader, path, connections):
             now = received
             for vector in joint_input.feed(data):
                 stamps[vector.chain].append(vector.sec * 1_000_000_000 + vector.nanosec)
@@ -120,9 +114,9 @@ def read_csv(path: str | Path, joint_names: Iterable[str]) -> JointRecording:
     try:
         with open(path, encoding='utf-8-sig', newline='') as stream:
             header = stream.readline()
-            delimiter = max(_DELIMITERS, key=header.count)
             stream.seek(0)
-            for row in _rows(str(path), csv.reader(stream, delimiter=delimiter), joints):
+            reader = csv.reader(stream, delimiter=max(_DELIMITERS, key=header.count))
+            for row in _rows(str(path), reader, joints):
                 values.extend(row)
     except OSError as error:
         raise InputFileError(f'{path}: {error.strerror or error}') from error
@@ -136,38 +130,34 @@ def read_csv(path: str | Path, joint_names: Iterable[str]) -> JointRecording:
 
 def _rows(file: str, reader: Any, joints: Sequence[str]) -> Iterator[list[float]]:
     """Yield time and joints of every row that a `csv.reader` gives, as numbers."""
+    def wrong(what: str, allowed: str) -> InputFileError:
+        return InputFileError(f'{file}:{reader.line_num or 1}: {what}; allowed: {allowed}')
+
     header = [name.strip() for name in next(reader, [])]
     if not any(header):
-        raise InputFileError(f'{file}:1: no header; allowed: time, {", ".join(joints)}')
+        raise wrong('no header', f'time, {", ".join(joints)}')
     shown = ', '.join(repr(name)[1:-1][:40] for name in header[:20])
     time = next((name for name in TIMES if name in header), None)
     if time is None:
-        raise InputFileError(f'{file}:1: no column of times in the header ({shown}); allowed: '
-                             f'{" or ".join(TIMES)}')
+        raise wrong(f'no column of times in the header ({shown})', ' or '.join(TIMES))
     columns = (time, *joints)
     for name in columns:
         if header.count(name) != 1:
             found = 'appears twice' if name in header else 'is missing'
-            raise InputFileError(f'{file}:1: column {name} {found} in the header ({shown}); '
-                                 f'needed: {", ".join(columns)}')
+            raise wrong(f'column {name} {found} in the header ({shown})', f'{", ".join(columns)}')
     places = [header.index(name) for name in columns]
     before = -math.inf
     for row in reader:
         if not row:  # an empty line
             continue
         if len(row) != len(header):
-            raise InputFileError(f'{file}:{reader.line_num}: {len(row)} values under '
-                                 f'{len(header)} columns; allowed: one value per column')
-        numbers = []
-        for name, place in zip(columns, places, strict=True):
-            value = number(row[place])
+            raise wrong(f'{len(row)} values under {len(header)} columns', 'one value per column')
+        numbers = [number(row[place]) for place in places]
+        for name, place, value in zip(columns, places, numbers):
             if not abs(value) <= (sys.float_info.max if name == time else LARGEST):
-                raise InputFileError(f'{file}:{reader.line_num}: column {name}: {row[place]!r}; '
-                                     f'allowed: a finite number up to {LARGEST:g}')
-            numbers.append(value)
+                raise wrong(f'column {name}: {row[place]!r}', f'a finite number up to {LARGEST:g}')
         if numbers[0] < before:
-            raise InputFileError(f'{file}:{reader.line_num}: column {time}: {numbers[0]} after '
-                                 f'{before}; allowed: times that do not decrease')
+            raise wrong(f'column {time}: {numbers[0]} after {before}', 'times in order')
         before = numbers[0]
         yield numbers
     if before == -math.inf:
@@ -177,11 +167,12 @@ def _rows(file: str, reader: Any, joints: Sequence[str]) -> Iterator[list[float]
 def write_joint_states(path: str | Path, sent: Iterable[tuple[int, bytes]], *, force: bool
                        ) -> None:
     """Write serialized JointStates, by stamp [ns], as a bag, whole or not at all."""
-    rosbag2, typesys = import_rosbags()
+    rosbag2, typesys = bag_reading.import_rosbags()
     store = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
     with whole_path(path, force=force, may_replace=is_bag) as place, \
             rosbag2.Writer(place, version=rosbag2.Writer.VERSION_LATEST,
                            storage_plugin=rosbag2.StoragePlugin.MCAP) as writer:
-        topic = writer.add_connection(DEFAULT_TOPIC, JOINT_STATE, typestore=store)
+        topic = writer.add_connection(bag_reading.DEFAULT_TOPIC, bag_reading.JOINT_STATE,
+                                      typestore=store)
         for stamp, data in sent:
             writer.write(topic, stamp, data)
