@@ -17,6 +17,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import reduce
+from importlib import import_module
 import math
 from typing import Any
 
@@ -79,7 +80,7 @@ class Explanation:
         return float(value) if value.is_number else None
 
 
-class Algebra:
+class _Algebra:
     """The arithmetic: in floats, or exact in sympy's expressions.
 
     Where it is exact, `symbols` keeps the meaning of every symbol, and cosines and sines of a
@@ -90,26 +91,19 @@ class Algebra:
     def __init__(self, exact: bool) -> None:
         self.symbols: dict[str, Cell] = {}
         self._thetas: dict[int, Cell] = {}
-        self._sympy: Any = None
-        if exact:
-            try:
-                import sympy
-            except ImportError as error:
-                raise MissingDependencyError(
-                    'sympy is not installed: exact and symbolic answers need it (pip install '
-                    'sympy, rosdep key python3-sympy); decimal ones do not, give --degrees or '
-                    '--radians') from error
-            self._sympy = sympy
+        try:
+            self._sympy: Any = import_module('sympy') if exact else None
+        except ImportError as error:
+            raise MissingDependencyError(
+                'sympy is not installed: exact and symbolic answers need it (pip install sympy, '
+                'rosdep key python3-sympy); decimal ones do not, give --degrees or --radians'
+                ) from error
 
     def number(self, value: float) -> Cell:
-        """Return a number, exact as the fraction that was printed."""
         return self._sympy.Rational(Fraction(repr(value))) if self._sympy else value
 
     def mm(self, metres: float) -> Cell:
-        """Return a length in mm, likewise."""
-        if not self._sympy:
-            return 1000 * metres
-        return self._sympy.Rational(Fraction(f'{1000 * metres:.12g}'))
+        return self.number(float(f'{1000 * metres:.12g}') if self._sympy else 1000 * metres)
 
     def angle(self, radians: float) -> Cell:
         """Return an angle, exact as a part of pi if its degrees have at most four decimals."""
@@ -125,10 +119,9 @@ class Algebra:
             return theta, d
         position = (self._sympy.Symbol(f'q_{index}') if q is None
                     else self.mm(q) if link.is_prismatic else self.angle(q))
-        name, value = ((f'd_{index}', d) if link.is_prismatic else (f'theta_{index}', theta))
-        moved = link.sign * position + value
+        moved = link.sign * position + (d if link.is_prismatic else theta)
         if q is None:
-            moved = self._define(name, moved)
+            moved = self._define(f'{"d" if link.is_prismatic else "theta"}_{index}', moved)
         return (theta, moved) if link.is_prismatic else (moved, d)
 
     def cos_sin(self, index: int, theta: Cell) -> tuple[Cell, Cell]:
@@ -138,9 +131,8 @@ class Algebra:
 
     def cos_sin_constant(self, angle: Cell) -> tuple[Cell, Cell]:
         """Return cosine and sine of an angle that is no joint's."""
-        if not self._sympy:
-            return cos_sin(float(angle))
-        return self._sympy.cos(angle), self._sympy.sin(angle)
+        return ((self._sympy.cos(angle), self._sympy.sin(angle)) if self._sympy
+                else cos_sin(float(angle)))
 
     def running_products(self, steps: Sequence[Step], modified: bool) -> list[Matrix]:
         """Return T_01, T_02, ... T_0m, with the angles of joints on parallel axes added up."""
@@ -205,7 +197,7 @@ def work_out(version: ChainVersion, chain: Chain, foot_frame: str | None,
 
     Numbers stay exact where joints are symbols, or on request, which needs sympy.
     """
-    algebra, decimals = Algebra(exact or q is None), Algebra(False)
+    algebra, decimals = _Algebra(exact or q is None), _Algebra(False)
     steps = _steps(chain, q, algebra)
     tip, sole = _TIP_SYMBOLS.get(chain.tip, ('E', 'S'))
     tips = []
@@ -234,13 +226,13 @@ def product(*matrices: Matrix) -> Matrix:
                                  for column in zip(*B)] for row in A], matrices)
 
 
-def _constant(T: Array, algebra: Algebra) -> Matrix:
+def _constant(T: Array, algebra: _Algebra) -> Matrix:
     """Return a constant transform, whose translation is in metres, in mm."""
     return [[*map(algebra.number, row[:3]), algebra.mm(row[3])]
             for row in T[:3].tolist()] + [[0, 0, 0, 1]]
 
 
-def _steps(chain: Chain, q: Sequence[float] | None, algebra: Algebra) -> list[Step]:
+def _steps(chain: Chain, q: Sequence[float] | None, algebra: _Algebra) -> list[Step]:
     names = iter(chain.joint_names)
     given: Iterator[float | None] = iter([None] * chain.n if q is None else q)
     modified = chain.convention == 'modified'
