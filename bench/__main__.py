@@ -1,7 +1,5 @@
 """Measure everything beside what it is compared to: `python -m bench`, or `make bench`."""
 
-from __future__ import annotations
-
 import argparse
 from importlib import import_module
 import os

@@ -1,7 +1,5 @@
 """`leg_fk bag` beside the plain loop over rosbags: time, memory, and two jobs beside one."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 import os
 from pathlib import Path

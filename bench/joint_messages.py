@@ -1,7 +1,5 @@
 """The joint states that every measurement uses."""
 
-from __future__ import annotations
-
 import math
 
 ROBOT_JOINTS = (

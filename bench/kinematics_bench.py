@@ -1,7 +1,5 @@
 """One pose and many poses beside Pinocchio; `leg_fk pose`'s start."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 import subprocess
 import sys

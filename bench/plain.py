@@ -4,8 +4,6 @@
 rosbags' `AnyReader`, deserializes, multiplies matrices, serializes and writes message by message.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 import math
 from pathlib import Path

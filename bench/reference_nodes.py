@@ -4,8 +4,6 @@
 `floor` does the least that any Python node must do that answers a JointState with two PoseStamped.
 """
 
-from __future__ import annotations
-
 import signal
 import sys
 from threading import Event

@@ -1,7 +1,5 @@
 """Figures with their spread, printed as they come; promises kept and missed."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 import os
 from pathlib import Path

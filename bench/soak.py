@@ -4,8 +4,6 @@ Passes if no pose is lost that the rules promise, the node's memory grows by les
 the first minute (of a longer run), and its latency stays what it was.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import statistics

@@ -1,7 +1,5 @@
 """A robot that behaves badly: joint states at 1 kHz, with a new fault every two seconds."""
 
-from __future__ import annotations
-
 from collections import Counter, deque
 from collections.abc import Callable, Iterator
 import itertools

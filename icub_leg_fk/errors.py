@@ -1,7 +1,5 @@
 """Errors of icub_leg_fk: each carries its data and says what would have been allowed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 import reprlib
 

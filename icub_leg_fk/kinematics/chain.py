@@ -1,7 +1,5 @@
 """A serial chain of DH links: its forward kinematics, link frames and geometric Jacobian."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """What the value classes of this room share: arrays nobody can write to, equality and hash."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Mapping
 from dataclasses import Field, fields
 from typing import Any, ClassVar

@@ -1,7 +1,5 @@
 """One link of a chain in the standard (distal) Denavit-Hartenberg convention."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 import math
 

@@ -1,7 +1,5 @@
 """Rotations: unit quaternions in ROS order (x, y, z, w), and exact right angles."""
 
-from __future__ import annotations
-
 import math
 from typing import overload
 

@@ -18,8 +18,6 @@ The results equal the product of the 4x4 matrices, `Chain.forward`, and the Jaco
 joint velocities, which the tests hold them to.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 import math
 import reprlib

@@ -10,8 +10,6 @@ degrees, a >= 0. Axes that a URDF's rounding has made almost parallel are taken 
 that truly are a little apart, whose common normal is far away, get a fixed row between them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 import math

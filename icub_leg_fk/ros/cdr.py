@@ -11,8 +11,6 @@ Written are PoseStamped, TwistStamped and TFMessage, little-endian: all but stam
 prepared once.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 import struct
 from typing import NamedTuple

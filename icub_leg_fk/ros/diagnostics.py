@@ -1,7 +1,5 @@
 """What the node says of itself once a second: a status per chain; the signs of life beside it."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable
 import time

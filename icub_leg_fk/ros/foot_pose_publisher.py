@@ -1,7 +1,5 @@
 """The node: subscribes to joint states and publishes the poses of the feet."""
 
-from __future__ import annotations
-
 import time
 
 from icub_leg_fk.ros.configuration import Configuration

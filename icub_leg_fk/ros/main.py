@@ -1,7 +1,5 @@
 """Start and stop of the node: `ros2 run icub_leg_fk foot_pose_publisher`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 import os

@@ -4,8 +4,6 @@ A topic that nobody subscribes to costs nothing: the middleware tells when a sub
 goes, and only then is it decided anew what a chain's joint vectors become.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The node's parameters: declared with type, description and bounds; changed all or nothing."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 

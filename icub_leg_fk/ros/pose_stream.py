@@ -3,8 +3,6 @@
 The node sends them to its topics, and `leg_fk bag` writes them into a recording.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """QoS of the node's topics, changed by parameters `qos_overrides.<topic>.<role>.<policy>`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

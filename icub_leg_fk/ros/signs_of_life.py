@@ -1,7 +1,5 @@
 """What the log says of the node's work: what it publishes, and why nothing comes; rclpy-free."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

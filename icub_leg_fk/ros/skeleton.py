@@ -1,7 +1,5 @@
 """Marker messages that draw a chain as a skeleton, for RViz and Foxglove."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from builtin_interfaces.msg import Time

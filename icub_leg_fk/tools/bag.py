@@ -3,8 +3,6 @@
 `add_foot_poses` takes and returns plain values, so a fleet of recordings is a map over it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace

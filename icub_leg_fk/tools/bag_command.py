@@ -1,7 +1,5 @@
 """`leg_fk bag`: adds the poses of the feet to recordings, several at a time."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import as_completed, ProcessPoolExecutor

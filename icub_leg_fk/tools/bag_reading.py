@@ -4,8 +4,6 @@ rosbags (https://ternaris.gitlab.io/rosbags/) reads rosbag2 directories and sing
 files. What it would pass over, or refuse without a name, is looked at first.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 import os

@@ -1,7 +1,5 @@
 """`leg_fk compare`: which version of the tables a robot is, and how far off, by its URDF."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 from itertools import permutations, product

@@ -1,7 +1,5 @@
 """The demonstration's session: the node in a process of its own, joint states out, poses back."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """`leg_fk explain`: how the pose of a chain follows from its Denavit-Hartenberg table."""
 
-from __future__ import annotations
-
 import argparse
 import math
 from typing import Any

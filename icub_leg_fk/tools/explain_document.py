@@ -4,8 +4,6 @@ What is said stands in `_blocks`; `as_text` and `as_latex` say how. Formulas wit
 tables stand between backticks. Entries of matrices are written by sympy's own printers.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 import math

@@ -11,8 +11,6 @@ Rz(theta_3 - theta_4) Rx(pi). Such angles are added up while multiplying, and ap
 s_34, or c_3m4 and s_3m4 for a difference.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction

@@ -5,8 +5,6 @@ A subcommand's module has `EXAMPLES`, `add_arguments(parser)` and `run(args)`. O
 subcommand asked for is imported; what is optional or heavy it imports inside functions.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 from contextlib import suppress

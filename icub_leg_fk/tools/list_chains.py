@@ -1,7 +1,5 @@
 """`leg_fk list`: the chains and versions of a kinematics file."""
 
-from __future__ import annotations
-
 import argparse
 from typing import Any
 

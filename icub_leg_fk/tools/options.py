@@ -1,7 +1,5 @@
 """What subcommands share: options by their names, and the chains and joint positions they mean."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable, Sequence
 import math

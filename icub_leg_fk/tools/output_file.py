@@ -1,7 +1,5 @@
 """Writing a file or a bag so that it is there whole or not at all."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import os

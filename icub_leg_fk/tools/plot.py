@@ -1,7 +1,5 @@
 """`leg_fk plot`: a picture of the feet over time and of the legs in space."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 from dataclasses import replace

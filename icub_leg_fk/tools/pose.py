@@ -1,7 +1,5 @@
 """`leg_fk pose`: the pose of a chain's tip for one joint vector."""
 
-from __future__ import annotations
-
 import argparse
 
 from icub_leg_fk.kinematics import Chain

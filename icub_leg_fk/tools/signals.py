@@ -1,7 +1,5 @@
 """Signals that ask a process to stop: as an exception that lets it clean up, or held back."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 import signal

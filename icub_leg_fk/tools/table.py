@@ -1,7 +1,5 @@
 """`leg_fk table`: the Denavit-Hartenberg tables of a robot from its URDF, as a kinematics file."""
 
-from __future__ import annotations
-
 import argparse
 import math
 from pathlib import Path

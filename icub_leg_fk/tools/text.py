@@ -1,7 +1,5 @@
 """Numbers, tables and matrices as text that can be checked by eye."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 import json
 import math

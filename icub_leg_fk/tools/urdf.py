@@ -4,8 +4,6 @@ The URDF link after joint i is frame i turned (or slid) by the joint alone, so t
 link, A_i at q = 0, becomes the fixed origin of the next joint. Every joint moves along its z.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections import Counter
 from collections.abc import Mapping
