@@ -32,31 +32,19 @@ _NAMES_SHOWN = 20
 
 @dataclass(frozen=True)
 class Summary:
-    """What has been done with one recording.
+    """What has been done with one recording."""
 
-    Attributes:
-        source: the recording that was read.
-        target: the one that was made.
-        copied: messages copied.
-        added: messages added, by topic.
-        joint_states: messages of joint states.
-        rejected: of these, how many were rejected, by reason.
-        held_back: per chain and reason, how many gave no pose or twist, and the joints concerned.
-        notes: what a user should know, one line each.
-        recorded: time from the first to the last message [s].
-        took: time the work took [s].
-    """
-
-    source: str
-    target: str
-    copied: int
-    added: dict[str, int]
-    joint_states: int
-    rejected: dict[str, int]
+    source: str  #: the recording that was read
+    target: str  #: the one that was made
+    copied: int  #: messages copied
+    added: dict[str, int]  #: messages added, by topic
+    joint_states: int  #: messages of joint states
+    rejected: dict[str, int]  #: of these, how many were rejected, by reason
+    #: per chain and reason, how many gave no pose or twist, and the joints concerned
     held_back: dict[str, dict[str, tuple[int, str]]]
-    notes: list[str]
-    recorded: float
-    took: float
+    notes: list[str]  #: what a user should know, one line each
+    recorded: float  #: time from the first to the last message [s]
+    took: float  #: time the work took [s]
 
 
 def add_foot_poses(

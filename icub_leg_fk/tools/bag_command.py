@@ -4,6 +4,7 @@ import argparse
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import as_completed, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from inspect import signature
 from multiprocessing import active_children, get_context
 import os
 from pathlib import Path
@@ -31,11 +32,6 @@ examples:
   leg_fk bag head head_poses --chains head_imu --version v2
   leg_fk bag walking all_poses --chains left_leg head_imu --chain-version head_imu=v2
   leg_fk bag monday/* --out-dir with_poses --jobs 4"""
-
-_AS_THEY_ARE = ('chains', 'version', 'kinematics_file', 'foot_frame', 'frame_prefix',
-                'joint_timeout', 'joint_topic', 'twist', 'tf', 'only_poses', 'replace_poses',
-                'storage', 'force')
-"""Options of the command that `add_foot_poses` has by the same name."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -70,7 +66,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Convert the bags."""
     tasks = _tasks(args)
-    settings = {name: getattr(args, name) for name in _AS_THEY_ARE}
+    settings = {name: value for name, value in vars(args).items()
+                if name in signature(add_foot_poses).parameters}
     settings['chain_versions'] = options.own_versions(args, args.chains)
     shows_progress = len(tasks) == 1 and sys.stderr is not None and sys.stderr.isatty()
     settings['progress'] = _show_share if shows_progress else None

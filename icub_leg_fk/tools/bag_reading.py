@@ -9,7 +9,6 @@ from contextlib import contextmanager, suppress
 import os
 from pathlib import Path
 import re
-import struct
 import tempfile
 from typing import Any
 
@@ -20,7 +19,7 @@ DEFAULT_TOPIC = '/joint_states'
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 METADATA = 'metadata.yaml'
 
-_MCAP_MAGIC = b'\x89MCAP0\r\n'
+_TAIL = 1 << 20  # bytes of an MCAP file, in which its summary is
 _CLEAN = re.compile(r'/?(?!/)[A-Za-z0-9._/ +@:,=-]*')  # what also sqlite takes as it is
 _MEND = {'.mcap': '`mcap recover` may mend it', '.db3': '`ros2 bag reindex` may mend it'}
 
@@ -55,7 +54,8 @@ def open_bag(path: str | Path) -> Iterator[Any]:
         try:
             _refuse_other_than_cdr(shown, {
                 connection.topic: connection.ext.serialization_format
-                for connection in reader.connections})
+                for storage in getattr(reader.storage, 'storages', [reader.storage])
+                for connection in storage.connections})
             if not isinstance(reader.storage.metadata.custom or {}, dict) or not all(
                     isinstance(connection.msgcount, int) for connection in reader.connections):
                 raise unreadable(path, ValueError(f'{METADATA} has values of the wrong type'))
@@ -134,13 +134,11 @@ def _look_first(path: Path, shown: str) -> None:
         if file.suffix == '.db3' and log.is_file() and log.stat().st_size:
             raise wrong(f'{log.name} holds messages that are not in {file.name} yet; this brings '
                         f"them in: sqlite3 {file.name} 'PRAGMA wal_checkpoint(TRUNCATE)'")
-        # Of damaged files rosbags will say what is wrong.
-        with suppress(OSError, struct.error, UnicodeDecodeError, IndexError):
-            profile, found = _mcap_summary(file) if file.suffix == '.mcap' else ('', {})
-            if 'ros1' in (profile, *found.values()):
-                raise wrong('is an MCAP file of ROS 1 messages; allowed: of ROS 2')
-            encodings |= found
-    with suppress(Exception):
+        if file.suffix == '.mcap':
+            encodings |= _encodings_of_other_mcap(file)
+    if 'ros1' in encodings.values():
+        raise wrong('is an MCAP file of ROS 1 messages; allowed: of ROS 2')
+    with suppress(Exception):  # of a damaged file rosbags will say what is wrong
         bag = yaml.safe_load((path / METADATA).read_text(encoding='utf-8'))
         for topic in bag['rosbag2_bagfile_information']['topics_with_message_count']:
             about = topic['topic_metadata']
@@ -156,30 +154,20 @@ def _refuse_other_than_cdr(shown: str, encodings: Mapping[str, str]) -> None:
                              'recordings of ROS 2, which are')
 
 
-def _mcap_summary(file: Path) -> tuple[str, dict[str, str]]:
-    """Return the profile of an MCAP file and the message encodings by topic, from its summary."""
-    def string(data: bytes, at: int) -> tuple[str, int]:
-        size, = struct.unpack_from('<I', data, at)
-        return data[at + 4:at + 4 + size].decode(), at + 4 + size
+def _encodings_of_other_mcap(file: Path) -> dict[str, str]:
+    """Return the encodings by topic that an MCAP file has that is not of ROS 2, by their looks.
 
+    rosbags tells no more of such a file than that its profile is another.
+    """
     with file.open('rb') as stream:
         head = stream.read(4096)
-        stream.seek(-37, os.SEEK_END)
-        end, footer = stream.tell(), stream.read()
-        start, = struct.unpack_from('<Q', footer, 9)
-        if not (head[:8] == footer[-8:] == _MCAP_MAGIC and 0 < start < end):
-            return '', {}
-        stream.seek(start)
-        summary = stream.read(min(end - start, 1 << 26))
-    encodings: dict[str, str] = {}
-    at = 0
-    while at + 9 <= len(summary):
-        kind, size = struct.unpack_from('<BQ', summary, at)
-        if kind == 0x04:  # a channel: id, schema, topic, encoding
-            topic, encoding_at = string(summary, at + 13)
-            encodings[topic], _ = string(summary, encoding_at)
-        at += 9 + size
-    return string(head, 17)[0], encodings
+        stream.seek(max(0, stream.seek(0, os.SEEK_END) - _TAIL))
+        tail = stream.read()
+    profile = head[21:21 + int.from_bytes(head[17:21], 'little')]
+    if profile == b'ros2' or not head.startswith(b'\x89MCAP0\r\n'):
+        return {}
+    return {topic.decode(): encoding.decode() for topic, encoding in re.findall(
+        rb'(/[\w/]+)[\4\x08\x0a]\0\0\0(json|ros1|cbor|protobuf|flatbuffer)', tail)}
 
 
 def _clean(path: Path, scratch: Path) -> Path:

@@ -39,7 +39,7 @@ examples:
 
 _INTERRUPTED = 128 + 2  # as a shell reports SIGINT
 _COLUMNS = ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
-_COLORS = {'left_foot': '\x1b[38;5;97m', 'right_foot': '\x1b[38;5;172m', '': '\x1b[2m'}
+_COLORS = {'left foot': '\x1b[38;5;97m', 'right foot': '\x1b[38;5;172m', '': '\x1b[2m'}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -150,9 +150,9 @@ class LiveTable:
     """Shows the newest poses every `period` [s]: on a terminal's second screen, else in lines."""
 
     def __init__(self, answers: Sequence[Answers], seconds: float, frame: str) -> None:
-        self._answers, self._seconds, self._frame = answers, seconds, frame
+        self._feet = {each.tip.replace('_', ' '): each for each in answers}
+        self._seconds, self._frame = seconds, frame
         self._live = sys.stdout.isatty() and os.environ.get('TERM', 'dumb') != 'dumb'
-        self._colored = not os.environ.get('NO_COLOR')
         self._elapsed = 0.0
         self.period = 0.1 if self._live else 1.0
 
@@ -175,30 +175,30 @@ class LiveTable:
         rows = self._rows(max(0, (width - 13) // 9))
         if len(rows) > height:
             rows = [*rows[:max(0, height - 1)], ('', 'more rows: enlarge the terminal')]
-        painted = (f'{_COLORS[tip]}{row[:width]}\x1b[0m' if self._colored else row[:width]
-                   for tip, row in rows)
-        picture = '\r\n'.join(f'{row}\x1b[K' for row in painted)
+        colors = {} if os.environ.get('NO_COLOR') else _COLORS
+        plain = '\x1b[0m' if colors else ''
+        picture = '\r\n'.join(f'{colors.get(name, "")}{row[:width]}{plain}\x1b[K'
+                              for name, row in rows)
         print(f'\x1b[H{picture}\x1b[J', end='', flush=True)
 
     def _line(self) -> str:
-        feet = ['{}: x {:+.4f}  y {:+.4f}  z {:+.4f} m'.format(
-            answers.tip.replace('_', ' '), *answers.poses[answers.newest, :3])
-            if answers.arrived else f'{answers.tip.replace("_", " ")}: no pose yet'
-            for answers in self._answers]
-        return f'{self._elapsed:7.2f} s   in {self._frame}: {"   ".join(feet)}'
+        feet = '   '.join(f'{name}: ' + ('x {:+.4f}  y {:+.4f}  z {:+.4f} m'.format(
+            *answers.poses[answers.newest, :3]) if answers.arrived else 'no pose yet')
+            for name, answers in self._feet.items())
+        return f'{self._elapsed:7.2f} s   in {self._frame}: {feet}'
 
     def _rows(self, columns: int) -> list[tuple[str, str]]:
-        """Return the rows of the table, each with the tip it is about."""
+        """Return the rows of the table, each with the foot it is about."""
         shown = _COLUMNS[:columns]
         rows = [('', f'poses in {self._frame}, in m'),
                 ('', ' ' * 12 + ''.join(f'{name:>9}' for name in shown))]
-        for answers in self._answers:
+        for name, answers in self._feet.items():
             newest = (answers.poses[answers.newest].round(4) + 0.0).tolist()  # no negative zeros
-            numbers = (''.join(f'{value:9.4f}' for value in newest[:len(shown)])
-                       if answers.arrived else '  no pose yet')
-            rows.append((answers.tip, f'{answers.tip.replace("_", " "):<12}{numbers}'))
+            rows.append((name, f'{name:12}' + (''.join(
+                f'{value:9.4f}' for value in newest[:len(shown)])
+                if answers.arrived else '  no pose yet')))
         if len(shown) < len(_COLUMNS):
             rows.append(('', f'{len(_COLUMNS) - len(shown)} more columns: widen the terminal'))
-        arrived = sum(answers.arrived for answers in self._answers)
+        arrived = sum(answers.arrived for answers in self._feet.values())
         return [*rows, ('', ''), ('', f'{self._elapsed:.2f} of {self._seconds:.2f} s, {arrived} '
                                   'poses')]

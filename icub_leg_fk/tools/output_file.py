@@ -16,15 +16,8 @@ def whole_path(path: str | Path, *, force: bool,
                may_replace: Callable[[Path], bool] = Path.is_file) -> Iterator[Path]:
     """Give a path to make a file or directory at; it takes its place when the block ends well.
 
-    The work is done in a hidden directory beside the target, of which nothing is left.
-
-    Args:
-        path: the target; its directory must exist.
-        force: whether an existing target is replaced.
-        may_replace: whether what stands there may be replaced at all.
-
-    Raises:
-        OutputFileError: the target exists, or it cannot be written.
+    The work is done in a hidden directory beside the target, of which nothing is left. A target
+    that exists is replaced if that is forced, and `may_replace` says that it is of the kind.
     """
     target = Path(os.path.realpath(path))
     check_target(path, force=force, may_replace=may_replace)

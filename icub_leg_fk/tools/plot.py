@@ -64,7 +64,10 @@ def run(args: argparse.Namespace) -> int:
                          'chains of one root frame')
     tracks, poseless = _read(args.input, chains, args.joint_topic)
     tracks = _between(tracks, args.begin, args.end)
-    instants = _checked(args.at, tracks) if args.at else default_instants(tracks)
+    start, end = time_span(tracks)
+    if outside := [instant for instant in args.at or () if not start <= instant <= end]:
+        raise LegFKError(f'--at: found {outside[0]:g} s, allowed: {start:g} to {end:g} s')
+    instants = sorted(args.at) if args.at else default_instants(tracks)
     shown = name if len(name) <= _LONGEST_NAME else f'{name[:_LONGEST_NAME]}...'
     title = f'{shown}   {", ".join(dict.fromkeys(chain.version for chain in chains))}'
     soles = {chain.name: catalog.chain(chain.name, chain.version, SOLE) for chain in chains
@@ -131,14 +134,6 @@ def _read(path: Path, chains: Sequence[Chain], topic: str | None
     recording = read_csv(path, dict.fromkeys(
         name for chain in chains for name in chain.joint_names))
     return [recording.track(chain) for chain in chains], []
-
-
-def _checked(instants: list[float], tracks: Sequence[ChainTrack]) -> list[float]:
-    start, end = time_span(tracks)
-    for instant in instants:
-        if not start <= instant <= end:
-            raise LegFKError(f'--at: found {instant:g} s, allowed: {start:g} to {end:g} s')
-    return sorted(instants)
 
 
 def _between(tracks: Sequence[ChainTrack], begin: float | None, end: float | None

@@ -55,10 +55,7 @@ def range_notes(chain: Chain, q: Sequence[float]) -> list[str]:
 
 
 def columns(rows: Rows, gap: str = '  ', header: Sequence[str] = ()) -> list[str]:
-    """Return the rows as lines, each column as wide as its widest cell.
-
-    Numbers stand with their decimal points under each other, other columns on the left.
-    """
+    """Return the rows as lines; numbers stand with their points under each other."""
     aligned = [_aligned(column) for column in zip(*rows, strict=True)]
     if header:
         aligned = [_aligned((title, *column)) for title, column in zip(header, aligned)]
@@ -89,18 +86,14 @@ def indented(lines: Iterable[str], by: int = 2) -> list[str]:
     return [' ' * by + line if line else '' for line in lines]
 
 
-def wrapped(text: str, after: str = '  ', margin: int = 0) -> list[str]:
+def wrapped(text: str) -> list[str]:
     """Return the lines of a sentence, all but the first moved to the right."""
-    return textwrap.wrap(text, WIDTH - margin, subsequent_indent=after, break_long_words=False,
+    return textwrap.wrap(text, WIDTH, subsequent_indent='  ', break_long_words=False,
                          break_on_hyphens=False)
 
 
 def as_json(value: Any) -> str:
-    """Return JSON with its innermost lists of numbers or words on one line each.
-
-    Raises:
-        LegFKError: a number in it is infinite, which JSON cannot say.
-    """
+    """Return JSON with its innermost lists of numbers or words on one line each."""
     try:
         text = json.dumps(value, indent=2, allow_nan=False)
     except ValueError as error:
