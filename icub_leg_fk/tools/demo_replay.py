@@ -48,10 +48,7 @@ class Answers:
 
 
 def stay_on_this_machine() -> str:
-    """Set up the environment so that DDS reaches nobody else; return the ROS_DOMAIN_ID.
-
-    A domain that the user has chosen stays, if it is one that DDS has.
-    """
+    """Let DDS reach nobody else; return the ROS_DOMAIN_ID, the user's if there is one."""
     if fault := unusable_domain():
         raise LegFKError(fault)
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
@@ -105,10 +102,7 @@ def _check_runs(process: subprocess.Popen[bytes], log: IO[bytes]) -> None:
 
 
 class Replay:
-    """Publishes joint states in their own timing and collects poses, until it is closed.
-
-    `answers` has what has come, per tip, and `sent` stamp [ns] and bytes of what was published.
-    """
+    """Publishes joint states in their own timing and collects poses, until it is closed."""
 
     def __init__(self, recording: JointRecording, namespace: str, tips: Sequence[str]) -> None:
         try:
@@ -120,13 +114,12 @@ class Replay:
             from rclpy.signals import SignalHandlerOptions
             from sensor_msgs.msg import JointState
         except ImportError as error:
-            raise MissingDependencyError(
-                f'the demonstration needs rclpy ({error}): source ROS 2, or pip install '
-                'icub_leg_fk[ros]') from error
+            raise MissingDependencyError(f'the demonstration needs rclpy ({error}): source ROS 2, '
+                                         'or pip install icub_leg_fk[ros]') from error
         count = len(recording.times)
         self.answers = [Answers(tip, np.full((count, 7), np.nan), np.full(count, np.nan))
                         for tip in tips]
-        self.sent: list[tuple[int, bytes]] = []
+        self.sent: list[tuple[int, bytes]] = []  # stamp [ns] and message
         self._recording = recording
         self._awaited: dict[int, tuple[int, float]] = {}  # by stamp: which message, sent when
         self._found: set[str] = set()

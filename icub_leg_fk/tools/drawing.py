@@ -43,11 +43,10 @@ _SETTINGS = {
     'font.family': 'sans-serif', 'font.sans-serif': ['DejaVu Sans'], 'font.size': 12,
     'axes.titlesize': 12, 'axes.titleweight': 'bold',
     'axes.edgecolor': FAINT, 'axes.spines.top': False, 'axes.spines.right': False,
-    'axes.grid': True, 'axes.axisbelow': True, 'grid.color': GRID,
-    'xtick.color': FAINT, 'ytick.color': FAINT, 'xtick.labelcolor': INK, 'ytick.labelcolor': INK,
-    'axes.labelcolor': INK, 'text.color': INK, 'legend.frameon': False, 'figure.dpi': 100,
-    'svg.fonttype': 'none', 'svg.hashsalt': 'leg_fk', 'pdf.fonttype': 42,
-}
+    'axes.grid': True, 'axes.axisbelow': True, 'grid.color': GRID, 'xtick.color': FAINT,
+    'ytick.color': FAINT, 'xtick.labelcolor': INK, 'ytick.labelcolor': INK, 'text.color': INK,
+    'axes.labelcolor': INK, 'legend.frameon': False, 'svg.fonttype': 'none',
+    'svg.hashsalt': 'leg_fk', 'pdf.fonttype': 42}
 
 
 @contextmanager
@@ -58,9 +57,8 @@ def _plain_matplotlib() -> Iterator[None]:
     try:
         from matplotlib import rc_context, rcdefaults, rcParams
     except ImportError as error:
-        raise MissingDependencyError(
-            'pictures need matplotlib: pip install matplotlib (rosdep key python3-matplotlib)'
-        ) from error
+        raise MissingDependencyError('pictures need matplotlib: pip install matplotlib (rosdep '
+                                     'key python3-matplotlib)') from error
     except ValueError as error:  # a matplotlibrc in the working directory that is not text
         raise LegFKError(f'matplotlib cannot be imported: {error}; is there a file matplotlibrc '
                          'in this directory?') from error
@@ -117,7 +115,8 @@ def feet_figure(tracks: Sequence[ChainTrack], instants: Sequence[float], title: 
         top=1 - 0.95 / height, bottom=0.01, wspace=0.0, hspace=0.0)
     scenes = [[(track, int(np.abs(track.times - instant).argmin())) for track in tracks]
               for instant in instants]
-    points = np.vstack([_origins(sample) for scene in scenes for sample in scene])
+    points = np.vstack([track.chain.frames(track.positions[i])[:, :3, 3]
+                        for scene in scenes for track, i in scene])
     for i, (scene, instant) in enumerate(zip(scenes, instants)):
         space = Space(figure, spaces[i], points)
         _draw_scene(space, scene, soles)
@@ -135,17 +134,15 @@ def feet_figure(tracks: Sequence[ChainTrack], instants: Sequence[float], title: 
 def outside_ranges(track: ChainTrack) -> list[tuple[str, list[tuple[float, float]]]]:
     """Return where joints are beyond an end of their range: which end, and spans of time [s]."""
     found = []
-    for name, link, lower, upper, q in zip(
-            track.chain.joint_names, track.chain.joints, track.chain.lower.tolist(),
-            track.chain.upper.tolist(), track.positions.T, strict=True):
+    chain, last = track.chain, len(track.times) - 1
+    for name, link, q in zip(chain.joint_names, chain.joints, track.positions.T, strict=True):
+        lower, upper = link.limits
         for outside, sign, limit in ((q < lower, '<', lower), (q > upper, '>', upper)):
             if outside.any():
                 value = f'{limit:g} m' if link.is_prismatic else f'{math.degrees(limit):g}°'
-                edges = np.flatnonzero(np.diff([False, *outside, False]))
-                ends = np.minimum(edges, len(track.times) - 1)
-                spans = track.times[ends].reshape(-1, 2).tolist()
-                found.append((f'{name} {sign} {value}'.replace('-', _MINUS),
-                              [(start, end) for start, end in spans]))
+                ends = np.minimum(np.flatnonzero(np.diff([False, *outside, False])), last)
+                spans = [(start, end) for start, end in track.times[ends].reshape(-1, 2).tolist()]
+                found.append((f'{name} {sign} {value}'.replace('-', _MINUS), spans))
     return found
 
 
@@ -182,22 +179,18 @@ class Space:
         self._rightward = np.array([-math.sin(az), math.cos(az), 0.0])
         points = np.vstack((points, np.zeros((1, 3))))
         self.step = _round_step(float(np.ptp(points, axis=0).max()) / 7)
-        self.low = float(points[:, 2].min())
         lowest = np.floor(points.min(axis=0) / self.step - 1) * self.step
         highest = np.ceil(points.max(axis=0) / self.step + 1) * self.step
-        lowest[2] = self.low
-        for set_limits, low, high in zip(
-                (self.axes.set_xlim, self.axes.set_ylim, self.axes.set_zlim),
-                lowest.tolist(), highest.tolist()):
-            set_limits(low, high)
+        lowest[2] = low = float(points[:, 2].min())
+        self.axes.set(**{f'{axis}lim': ends for axis, ends in zip(
+            'xyz', zip(lowest.tolist(), highest.tolist()))})
         self.axes.set_box_aspect(highest - lowest, zoom=zoom)
-        xs, ys = (np.arange(low, high + self.step / 2, self.step)
-                  for low, high in zip(lowest[:2], highest[:2]))
-        self.fill([(xs[i], ys[j], self.low) for i, j in ((0, 0), (-1, 0), (-1, -1), (0, -1))],
-                  FLOOR, 0)
+        xs, ys = (np.arange(start, end + self.step / 2, self.step)
+                  for start, end in zip(lowest[:2], highest[:2]))
+        self.fill([(xs[i], ys[j], low) for i, j in ((0, 0), (-1, 0), (-1, -1), (0, -1))], FLOOR, 0)
         for x, y in (*((x, ys[[0, -1]]) for x in xs), *((xs[[0, -1]], y) for y in ys)):
-            self.line(np.transpose(np.broadcast_arrays(x, y, [self.low] * 2)), color=GRID,
-                      linewidth=1, zorder=1)
+            self.line(np.transpose(np.broadcast_arrays(x, y, [low] * 2)), color=GRID, linewidth=1,
+                      zorder=1)
 
     def depth(self, points: Array) -> float:
         """Return how near the middle of some points is to the viewer [m]; larger is nearer."""
@@ -219,9 +212,8 @@ class Space:
         """Draw the axes of a (4, 4) frame with their names, the nearest last."""
         origin = T[:3, 3]
         for i in sorted(range(3), key=lambda i: self.depth(T[:3, i])):
-            self.axes.quiver(*origin, *(length * T[:3, i]), color=AXIS_COLORS[i],
-                             linewidth=width, arrow_length_ratio=0.3, zorder=zorder,
-                             clip_on=False)
+            self.axes.quiver(*origin, *(length * T[:3, i]), color=AXIS_COLORS[i], clip_on=False,
+                             linewidth=width, arrow_length_ratio=0.3, zorder=zorder)
             aside = float(T[:3, i] @ self._rightward)
             self.axes.text(*(origin + 1.2 * length * T[:3, i]), labels[i], fontsize=size,
                            color=AXIS_COLORS[i], weight='bold', va='center', zorder=zorder + 1,
@@ -245,7 +237,8 @@ def _draw_scene(space: Space, scene: Sequence[tuple[ChainTrack, int]],
                 soles: Mapping[str, Chain]) -> None:
     """Draw chains, each at one of its samples, and their tips' paths around these."""
     space.frame(np.eye(4), 1.2 * space.step, 90)
-    nearest_last = sorted(scene, key=lambda sample: space.depth(_origins(sample)))
+    nearest_last = sorted(scene, key=lambda sample: space.depth(
+        sample[0].chain.frames(sample[0].positions[sample[1]])[:, :3, 3]))
     for rank, (track, i) in enumerate(nearest_last):
         chain, q, zorder = track.chain, track.positions[i], 10.0 * (rank + 1)
         around = np.abs(track.times - track.times[i]) <= _TRAIL
@@ -328,12 +321,6 @@ def _mark_instants(panels: Sequence[Axes], instants: Sequence[float]) -> None:
         panels[0].text(at, 0.99, letter, ha='center', va='top', weight='bold', fontsize=11,
                        transform=panels[0].get_xaxis_transform(),
                        bbox={'facecolor': 'white', 'linewidth': 0, 'pad': 0.5})
-
-
-def _origins(sample: tuple[ChainTrack, int]) -> Array:
-    """Return the (m + 2, 3) origins of a chain's frames at a sample [m]."""
-    track, i = sample
-    return np.asarray(track.chain.frames(track.positions[i])[:, :3, 3])
 
 
 def _breaks(times: Array) -> NDArray[np.intp]:

@@ -23,8 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add(parser, 'chain', '--version', '--foot-frame', '--kinematics-file')
     options.add_joint_positions(parser, required=False)
     parser.add_argument('--symbolic', action='store_true',
-                        help='exact numbers instead of decimals: pi/2, not 1.5708 (needs sympy, '
-                             'as do symbols)')
+                        help='exact numbers instead of decimals: pi/2, not 1.5708 (by sympy)')
     form = parser.add_mutually_exclusive_group()
     form.add_argument('--latex', action='store_true', help='print a LaTeX document')
     options.add(form, '--json')
@@ -59,8 +58,7 @@ def _as_json(e: Explanation) -> dict[str, Any]:
         'running_products': [_matrix(step.T_0) for step in e.steps],
         'T_root_0': _matrix(e.T_root_0),
         'after_last_link': {name: _matrix(T) for name, T in e.tips},
-        'T_root_tip': _matrix(e.T_root_tip),
-    }
+        'T_root_tip': _matrix(e.T_root_tip)}
 
 
 def _link(step: Step, modified: bool) -> dict[str, Any]:
@@ -69,14 +67,11 @@ def _link(step: Step, modified: bool) -> dict[str, Any]:
     names = ('Rx', 'tx', 'Rz', 'tz') if modified else ('Rz', 'tz', 'tx', 'Rx')
     return {
         'i': step.index, 'joint': step.joint or None, 'joint_type': link.joint_type,
-        'range': [scale * limit for limit in link.limits] if math.isfinite(link.limits[0])
-        else None,
-        'erratum': link.erratum,
-        'theta': _cell(step.theta), 'd': _cell(step.d), 'a': _cell(step.a),
-        'alpha': _cell(step.alpha),
+        'range': [scale * x for x in link.limits] if math.isfinite(link.limits[0]) else None,
+        'erratum': link.erratum, 'theta': _cell(step.theta), 'd': _cell(step.d),
+        'a': _cell(step.a), 'alpha': _cell(step.alpha),
         'factors': {name: _matrix(T) for name, T in zip(names, step.factors, strict=True)},
-        'A': _matrix(step.A),
-    }
+        'A': _matrix(step.A)}
 
 
 def _matrix(T: Matrix) -> list[list[float | str]]:

@@ -233,9 +233,8 @@ def _pi(angle: float) -> str:
     part = Fraction(f'{math.degrees(angle):.12g}') / 180
     if part.denominator > 180:
         return f'{angle:.6g}'
-    over, under = abs(part.numerator), part.denominator
-    words = f'{over if over > 1 else ""}pi{f"/{under}" if under > 1 else ""}' if over else '0'
-    return f'-{words}' if part < 0 else words
+    words = re.sub(r'\b1pi', 'pi', f'{part.numerator}pi/{part.denominator}').removesuffix('/1')
+    return words if part else '0'
 
 
 def _text_equation(e: Explanation, name: str, *matrices: Matrix) -> list[str]:

@@ -93,9 +93,8 @@ class _Algebra:
             self._sympy: Any = import_module('sympy') if exact else None
         except ImportError as error:
             raise MissingDependencyError(
-                'sympy is not installed: exact and symbolic answers need it (pip install sympy, '
-                'rosdep key python3-sympy); decimal ones do not, give --degrees or --radians'
-                ) from error
+                'sympy is not installed, exact answers need it (pip install sympy, rosdep key '
+                'python3-sympy); decimal ones do not: give --degrees or --radians') from error
 
     def number(self, value: float) -> Cell:
         return self._sympy.Rational(Fraction(repr(value))) if self._sympy else value

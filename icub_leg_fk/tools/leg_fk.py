@@ -23,17 +23,12 @@ COMMANDS = {  # module, and what it is for
     'list': ('list_chains', 'list the chains: versions, joints, tip frames'),
     'pose': ('pose', 'the pose of a foot, or any tip, for one joint vector'),
     'explain': ('explain', 'explain a chain: DH table, each A_i, products, answer'),
-    'bag': ('bag_command', 'copy a bag and add the poses of the feet, as the node would have '
-                           'published them'),
-    'plot': ('plot', 'a picture of the feet over time and of the legs in space, from a bag or a '
-                     'CSV file'),
-    'table': ('table', 'make the DH table of any robot from its URDF, as a kinematics file for '
-                       'every command'),
+    'bag': ('bag_command', 'copy a bag and add the poses of the feet, as the node sends them'),
+    'plot': ('plot', 'a picture of the feet over time and the legs in space, from a bag or CSV'),
+    'table': ('table', 'make the DH table of any robot from its URDF, as a kinematics file'),
     'compare': ('compare', 'compare a robot, given by its URDF, with the versions of the tables'),
     'urdf': ('urdf', 'write chains as a URDF, for RViz, Pinocchio and others'),
-    'demo': ('demo', 'the live demonstration: a walk played through the node, poses shown as they '
-                     'come'),
-}
+    'demo': ('demo', 'the live demonstration: a walk through the node, poses as they come')}
 
 DESCRIPTION = """\
 Joint angles in, foot poses out: forward kinematics of the iCub's legs, and of any
@@ -83,9 +78,8 @@ class Parser(argparse.ArgumentParser):
             if (not word.startswith('-') or word == '-' or _NEGATIVE.match(word) or option in known
                     or (word[:2] in known and not word.startswith('--'))):
                 continue
-            guess = near(option, known) or next(
-                (name for name in known if name.startswith('--') and len(option) > 3
-                 and option[2:] in name), '')
+            guess = near(option, known) or next((name for name in known if name[:2] == '--'
+                                                 and len(option) > 3 and option[2:] in name), '')
             self.error(f'unknown option {option}{f"; did you mean {guess}?" if guess else ""}')
 
 

@@ -145,8 +145,7 @@ def joint_positions(args: argparse.Namespace, chain: Chain) -> list[float] | Non
     if given is None:
         return None
     if len(given) != chain.n:
-        raise JointVectorError(
-            f'joint positions: found {len(given)}, allowed: {chain.n}, in the order '
-            f'{" ".join(chain.joint_names)}')
+        raise JointVectorError(f'joint positions: found {len(given)}, allowed: {chain.n}, in the '
+                               f'order {" ".join(chain.joint_names)}')
     return [value if args.degrees is None or link.is_prismatic else math.radians(value)
             for value, link in zip(given, chain.joints, strict=True)]

@@ -152,7 +152,6 @@ def _between(tracks: Sequence[ChainTrack], begin: float | None, end: float | Non
 def _times(text: str) -> list[float]:
     times = [options.number(word) for word in text.split(',')]
     if len(times) > _INSTANTS or not all(map(math.isfinite, times)):
-        raise argparse.ArgumentTypeError(
-            f'found {text.strip()!r}, allowed: up to {_INSTANTS} times in seconds, '
-            'separated by commas')
+        raise argparse.ArgumentTypeError(f'found {text.strip()!r}, allowed: up to {_INSTANTS} '
+                                         'times in seconds, separated by commas')
     return times
