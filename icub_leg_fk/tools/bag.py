@@ -100,7 +100,7 @@ def add_foot_poses(
         if not only_poses:
             job.leave_out_old_poses(replace_poses)
         with whole_path(target, force=force, may_replace=is_bag) as place:
-            with _writer(place, storage or _storage_of(source)) as writer:
+            with _writer(place, storage) as writer:
                 job.run(writer, progress)
             job.check_use()
         return job.summary(str(target), time.monotonic() - began)
@@ -135,7 +135,7 @@ class _Job:
         self._joint_ids = {connection.id for connection in joint_states}
         self._kept: list[Any] = [] if only_poses else list(reader.connections)
         self._own_tf: set[int] = set()  # connections to /tf with frames that are added
-        self._time = self._first = self._last = self._copied = 0
+        self._time = self._copied = 0
         self._input = JointInput(configuration.chains, configuration.joint_timeout,
                                  lambda: self._time, velocities=configuration.publish_twist)
         self._children = [configuration.frame_prefix + chain.tip_frame
@@ -164,8 +164,8 @@ class _Job:
                 found.append(f'{TF_TOPIC} with {", ".join(self._children)}')
                 self._own_tf = {connection.id for connection in transforms}
         if found and not replace_poses:
-            raise InputFileError(f'{self._source}: has {", ".join(found)} already; --only-poses '
-                                 'writes the new ones alone, --replace-poses leaves these out')
+            raise InputFileError(f'{self._source}: has {", ".join(found)} already; --replace-poses '
+                                 'leaves these out, --only-poses writes the new ones alone')
         self._kept = [connection for connection in self._kept if connection not in old]
         self._notes += [f'left out: {topic} of the recording' for topic in found]
 
@@ -181,9 +181,6 @@ class _Job:
         total = sum(connection.msgcount for connection in wanted) or 1
         for number, (connection, timestamp, data) in enumerate(
                 messages(self._reader, self._source, wanted)):
-            if number == 0:
-                self._first = timestamp
-            self._last = max(timestamp, self._last)
             if (copy := copies.get(connection.id)) is not None:
                 kept = self._without_own_transforms(data) if connection.id in own_tf else data
                 if kept is not None:
@@ -203,13 +200,12 @@ class _Job:
             return
         wanted = '; '.join(f'{chain.name} needs {", ".join(chain.joint_names)}'
                            for chain in self._configuration.chains)
-        if not self._input.messages:
-            raise InputFileError(f'{self._source}: no message of joint states; {wanted}')
-        names = self._input.names_since()
-        shown = ', '.join(names[:_NAMES_SHOWN]) or 'none'
-        more = len(names) - _NAMES_SHOWN
-        raise InputFileError(f'{self._source}: no message has a joint of any chain: {wanted}; '
-                             f'names found: {shown}{f" and {more} more" if more > 0 else ""}')
+        why = 'has a joint of any chain' if self._input.messages else 'of joint states'
+        names = list(self._input.names_since())
+        if more := names[_NAMES_SHOWN:]:
+            names[_NAMES_SHOWN:] = [f'and {len(more)} more']
+        raise InputFileError(f'{self._source}: no message {why}; {wanted}; names found: '
+                             f'{", ".join(names) or "none"}')
 
     def summary(self, target: str, took: float) -> Summary:
         """Return what has been done."""
@@ -222,7 +218,7 @@ class _Job:
         return Summary(
             str(self._source), target, self._copied, self._added, joint_input.messages,
             dict(joint_input.counts), held_back, list(dict.fromkeys(self._notes)),
-            (self._last - self._first) / 1e9, took)
+            max(0, self._reader.duration - 1) / 1e9, took)
 
     def _stream(self, writer: Any, copies: Mapping[int, Any]) -> PoseStream:
         """Return what writes the messages that are added."""
@@ -302,10 +298,7 @@ def _as_options(text: str) -> str:
 
 
 def _checked(source: Path, target: Path, storage: str) -> str:
-    """Return the storage that is asked for, if any; refuse a target that cannot be.
-
-    A recording is not written into, over or around the one that is read.
-    """
+    """Return the storage to use; refuse a target in, over or around the source."""
     here, there = source.resolve(), target.resolve()
     if here == there or here in there.parents or there in here.parents:
         raise OutputFileError(f'{target}: is the input itself, or a part of it or what it is in; '
@@ -314,9 +307,6 @@ def _checked(source: Path, target: Path, storage: str) -> str:
     if named and storage not in ('', named):
         raise OutputFileError(f'{target}: is a name for {named}, and --storage is {storage}; '
                               'allowed: one that agrees, or a name without such an ending')
-    return named or storage
-
-
-def _storage_of(bag: Path) -> str:
-    files = bag.iterdir() if bag.is_dir() else (bag,)
-    return 'mcap' if any('.mcap' in file.suffixes for file in files) else 'sqlite3'
+    files = source.iterdir() if source.is_dir() else (source,)
+    return named or storage or (
+        'mcap' if any('.mcap' in file.suffixes for file in files) else 'sqlite3')
