@@ -164,8 +164,8 @@ class _Job:
                 found.append(f'{TF_TOPIC} with {", ".join(self._children)}')
                 self._own_tf = {connection.id for connection in transforms}
         if found and not replace_poses:
-            raise InputFileError(f'{self._source}: has {", ".join(found)} already; --replace-poses '
-                                 'leaves these out, --only-poses writes the new ones alone')
+            raise InputFileError(f'{self._source}: has {", ".join(found)} already; '
+                                 '--replace-poses leaves these out, --only-poses writes the new')
         self._kept = [connection for connection in self._kept if connection not in old]
         self._notes += [f'left out: {topic} of the recording' for topic in found]
 

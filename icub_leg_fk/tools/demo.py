@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from contextlib import closing
+from dataclasses import replace
 import os
 from pathlib import Path
 import shutil
@@ -18,7 +19,7 @@ from icub_leg_fk.tools.demo_replay import Answers, Replay
 from icub_leg_fk.tools.drawing import check_output, feet_figure, save_picture
 from icub_leg_fk.tools.output_file import check_target, is_bag
 from icub_leg_fk.tools.plot import default_instants
-from icub_leg_fk.tools.recording import ChainTrack, JointRecording
+from icub_leg_fk.tools.recording import JointRecording
 from icub_leg_fk.tools.signals import stop_on_signals
 import numpy as np
 
@@ -83,11 +84,12 @@ def run(args: argparse.Namespace) -> int:
         status = conclude(replay.answers, recording.times[:len(replay.sent)].tolist(), whole)
         if whole and all(answers.arrived for answers in replay.answers):
             source = args.recording.name if args.recording else 'synthetic gait'
-            tracks = [_track(*pair, recording) for pair in zip(chains, replay.answers)]
+            tracks = [replace(recording.track(chain), received=answers.poses).where(
+                np.isfinite(answers.latencies)) for chain, answers in zip(chains, replay.answers)]
             soles = {chain.name: catalog.chain(chain.name, args.version, 'sole')
                      for chain in chains}
-            save_picture(lambda: feet_figure(tracks, default_instants(tracks),
-                                             f'{source}   {args.version}', soles),
+            title = f'{source}   {args.version}'
+            save_picture(lambda: feet_figure(tracks, default_instants(tracks), title, soles),
                          picture, force=force)
             print(f'picture       {picture}', flush=True)
         if whole and args.save:
@@ -112,13 +114,6 @@ def _play(namespace: str, recording: JointRecording, chains: Sequence[Chain],
                 return replay, True
             except KeyboardInterrupt:
                 return replay, False
-
-
-def _track(chain: Chain, answers: Answers, recording: JointRecording) -> ChainTrack:
-    """Return what a chain did at the poses that have arrived."""
-    track, came = recording.track(chain), np.isfinite(answers.latencies)
-    return ChainTrack(chain, track.times[came] - recording.times[0], track.positions[came],
-                      answers.poses[came])
 
 
 def conclude(answers: Sequence[Answers], times: Sequence[float], whole: bool) -> int:

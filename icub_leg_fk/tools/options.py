@@ -33,16 +33,13 @@ _OPTIONS: dict[str, dict[str, Any]] = {
                         'help': 'version of one chain; may stand several times'},
     '--foot-frame': {'metavar': 'FRAME',
                      'help': "axes of the tip: of the iCub's feet dh, the table's last frame (the "
-                             'default), or sole, x forward, y left, z up; of another robot what '
-                             'your file has'},
+                             'default), or sole, x forward, y left, z up'},
     '--joint-topic': {'metavar': 'TOPIC', 'help': "the bag's topic of joint states (default: "
                       '/joint_states, or the only one there is)'},
     '--json': {'action': 'store_true', 'help': 'print JSON, for programs'},
-    '--kinematics-file': {'metavar': 'FILE',
-                          'help': 'a kinematics file of your own, with the DH tables of any robot '
-                                  "(default: the iCub's, as shipped)"},
-    '--force': {'action': 'store_true', 'help': 'replace what exists already'},
-}
+    '--kinematics-file': {'metavar': 'FILE', 'help': 'a kinematics file, with the DH tables of '
+                          "any robot (default: the iCub's, as shipped)"},
+    '--force': {'action': 'store_true', 'help': 'replace what exists already'}}
 
 
 def add(parser: argparse._ActionsContainer, *names: str) -> None:

@@ -2,7 +2,6 @@
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import replace
 import math
 from pathlib import Path
 import sys
@@ -145,8 +144,7 @@ def _between(tracks: Sequence[ChainTrack], begin: float | None, end: float | Non
     if not all(mask.any() for mask in inside):
         raise LegFKError(f'--from, --to: found {begin:g} to {end:g} s, in which not every chain '
                          f'has a pose; the recording goes from {start:g} to {stop:g} s')
-    return [replace(track, times=track.times[mask], positions=track.positions[mask])
-            for track, mask in zip(tracks, inside)]
+    return [track.where(mask) for track, mask in zip(tracks, inside)]
 
 
 def _times(text: str) -> list[float]:

@@ -21,6 +21,7 @@ from icub_leg_fk.tools import bag_reading
 from icub_leg_fk.tools.options import LARGEST, number
 from icub_leg_fk.tools.output_file import is_bag, whole_path
 import numpy as np
+from numpy.typing import NDArray
 
 TIMES = ('time', 'Time', 'timestamp')
 EPOCH = 1e8  # s; times beyond it count from 1970 and not from the start
@@ -59,6 +60,11 @@ class ChainTrack:
     def poses(self) -> Array:
         """(N, 7) rows x, y, z [m], qx, qy, qz, qw of the tip in the root frame."""
         return self.chain.poses(self.positions) if self.received is None else self.received
+
+    def where(self, mask: NDArray[np.bool_]) -> ChainTrack:
+        """Return the samples that an (N,) mask chooses."""
+        return ChainTrack(self.chain, self.times[mask], self.positions[mask],
+                          None if self.received is None else self.received[mask])
 
 
 def time_span(tracks: Sequence[ChainTrack]) -> tuple[float, float]:
