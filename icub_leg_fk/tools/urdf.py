@@ -59,19 +59,15 @@ def run(args: argparse.Namespace) -> int:
 
 def _tables(catalog: Catalog, args: argparse.Namespace) -> dict[tuple[str, str], ChainVersion]:
     """Return the tables asked for, by chain and version."""
-    for name in args.chains:
-        catalog.entry(name)
     own = options.own_versions(args, args.chains or list(catalog.chains))
     names = args.chains or [name for name, entry in catalog.chains.items()
                             if name in own or args.version in entry.versions]
-    chosen = {name: own.get(name, args.version) for name in names}
-    if not chosen:
+    if not names:
         raise UnknownNameError('version', args.version, dict.fromkeys(
             version for entry in catalog.chains.values() for version in entry.versions))
-    for name, version in chosen.items():
-        catalog.chain(name, version)  # which says what is wrong
-    return {(name, version): catalog.entry(name).versions[version]
-            for name, version in chosen.items()}
+    chains = [catalog.chain(name, own.get(name, args.version)) for name in names]
+    return {(chain.name, chain.version): catalog.entry(chain.name).versions[chain.version]
+            for chain in chains}
 
 
 def urdf_text(robot: str, tables: Mapping[tuple[str, str], ChainVersion]) -> str:
@@ -134,9 +130,12 @@ def _add_chain(model: ET.Element, joints: dict[str, tuple[str, DHLink, Array]], 
             continue
         name = next(names)
         if name in joints:
+            other_parent, other, place = joints[name]
             # It may be elsewhere along and about its axis, which makes no difference to it.
-            T = np.linalg.inv(joints[name][2]) @ origin
-            if not (_is_same(link, joints[name][1], T) and joints[name][0] == parent):
+            T = np.linalg.inv(place) @ origin
+            off_axis = np.hstack((T[:3, 2] - (0, 0, 1), T[:2, 3] * (not link.is_prismatic)))
+            if np.abs(off_axis).max() > 1e-9 or (parent, link.joint_type, link.sign) != (
+                    other_parent, other.joint_type, other.sign):
                 raise LegFKError(f'joint {name!r} of chain {chain} is elsewhere in another chain; '
                                  'choose chains that agree on the joints they share')
             origin = T @ link.transform()
@@ -158,12 +157,6 @@ def _add_chain(model: ET.Element, joints: dict[str, tuple[str, DHLink, Array]], 
             _draw(tip, 'tip', 'box', (low + high) / 2, size='{:g} {:g} {:g}'.format(*high - low))
         elif 'sole' not in table.tip_frames:
             _draw(tip, 'tip', 'sphere', radius=_TIP_RADIUS)
-
-
-def _is_same(link: DHLink, other: DHLink, T: Array) -> bool:
-    return (np.allclose(T[:3, 2], (0, 0, 1), rtol=0, atol=1e-9)
-            and (link.is_prismatic or np.allclose(T[:2, 3], 0, rtol=0, atol=1e-9))
-            and (link.joint_type, link.sign) == (other.joint_type, other.sign))
 
 
 def _add_joint(model: ET.Element, chain: str, name: str, link: DHLink, origin: Array, parent: str
