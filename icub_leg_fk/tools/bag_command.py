@@ -15,7 +15,6 @@ from typing import Any
 from icub_leg_fk.errors import LegFKError, OutputFileError
 from icub_leg_fk.tools import options
 from icub_leg_fk.tools.bag import add_foot_poses, STORAGES, Summary
-from icub_leg_fk.tools.signals import stop_on_signals
 from icub_leg_fk.tools.text import columns, indented
 
 EXAMPLES = """\
@@ -72,17 +71,16 @@ def run(args: argparse.Namespace) -> int:
     shows_progress = len(tasks) == 1 and sys.stderr is not None and sys.stderr.isatty()
     settings['progress'] = _show_share if shows_progress else None
     failed = False
-    with stop_on_signals():
-        for (source, _), outcome in _outcomes(tasks, settings, min(args.jobs, len(tasks))):
-            if shows_progress:
-                print('\r\033[K', end='', file=sys.stderr, flush=True)
-            if isinstance(outcome, Summary):
-                print('\n'.join(_summary_lines(outcome)), flush=True)
-                continue
-            failed = True
-            line = ' '.join(str(outcome).split())
-            named = '' if line.startswith(str(source)) or len(tasks) == 1 else f'{source}: '
-            print(f'leg_fk: error: {named}{line}', file=sys.stderr, flush=True)
+    for (source, _), outcome in _outcomes(tasks, settings, min(args.jobs, len(tasks))):
+        if shows_progress:
+            print('\r\033[K', end='', file=sys.stderr, flush=True)
+        if isinstance(outcome, Summary):
+            print('\n'.join(_summary_lines(outcome)), flush=True)
+            continue
+        failed = True
+        line = ' '.join(str(outcome).split())
+        named = '' if line.startswith(str(source)) or len(tasks) == 1 else f'{source}: '
+        print(f'leg_fk: error: {named}{line}', file=sys.stderr, flush=True)
     return 2 if failed else 0
 
 

@@ -20,7 +20,6 @@ from icub_leg_fk.tools.drawing import check_output, feet_figure, save_picture
 from icub_leg_fk.tools.output_file import check_target, is_bag
 from icub_leg_fk.tools.plot import default_instants
 from icub_leg_fk.tools.recording import JointRecording
-from icub_leg_fk.tools.signals import stop_on_signals
 import numpy as np
 
 EXAMPLES = """\
@@ -75,26 +74,25 @@ def run(args: argparse.Namespace) -> int:
     print(f'iCub legs {args.version}: {len(recording.times)} JointState messages to '
           f'foot_pose_publisher, poses back over DDS\n'
           f'(this machine only, ROS_DOMAIN_ID {domain}, namespace {namespace})\n', flush=True)
-    with stop_on_signals():
-        try:
-            replay, whole = _play(namespace, recording, chains, args)
-        except demo_replay.DemoError as error:
-            print(f'leg_fk: error: {error}', file=sys.stderr)
-            return 1
-        status = conclude(replay.answers, recording.times[:len(replay.sent)].tolist(), whole)
-        if whole and all(answers.arrived for answers in replay.answers):
-            source = args.recording.name if args.recording else 'synthetic gait'
-            tracks = [replace(recording.track(chain), received=answers.poses).where(
-                np.isfinite(answers.latencies)) for chain, answers in zip(chains, replay.answers)]
-            soles = {chain.name: catalog.chain(chain.name, args.version, 'sole')
-                     for chain in chains}
-            title = f'{source}   {args.version}'
-            save_picture(lambda: feet_figure(tracks, default_instants(tracks), title, soles),
-                         picture, force=force)
-            print(f'picture       {picture}', flush=True)
-        if whole and args.save:
-            recordings.write_joint_states(args.save, replay.sent, force=args.force)
-            print(f'bag           {args.save}', flush=True)
+    try:
+        replay, whole = _play(namespace, recording, chains, args)
+    except demo_replay.DemoError as error:
+        print(f'leg_fk: error: {error}', file=sys.stderr)
+        return 1
+    status = conclude(replay.answers, recording.times[:len(replay.sent)].tolist(), whole)
+    if whole and all(answers.arrived for answers in replay.answers):
+        source = args.recording.name if args.recording else 'synthetic gait'
+        tracks = [replace(recording.track(chain), received=answers.poses).where(
+            np.isfinite(answers.latencies)) for chain, answers in zip(chains, replay.answers)]
+        soles = {chain.name: catalog.chain(chain.name, args.version, 'sole')
+                 for chain in chains}
+        title = f'{source}   {args.version}'
+        save_picture(lambda: feet_figure(tracks, default_instants(tracks), title, soles),
+                     picture, force=force)
+        print(f'picture       {picture}', flush=True)
+    if whole and args.save:
+        recordings.write_joint_states(args.save, replay.sent, force=args.force)
+        print(f'bag           {args.save}', flush=True)
     return status
 
 

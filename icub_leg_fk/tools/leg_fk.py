@@ -18,6 +18,7 @@ from typing import Any, NoReturn
 
 from icub_leg_fk import __version__
 from icub_leg_fk.errors import LegFKError, near, UnknownNameError
+from icub_leg_fk.tools.signals import stop_on_signals
 
 COMMANDS = {  # module, and what it is for
     'list': ('list_chains', 'list the chains: versions, joints, tip frames'),
@@ -37,8 +38,8 @@ Denavit-Hartenberg table. Lengths are metres, quaternions x y z w, poses in the 
 EXAMPLES = """\
 examples:
   leg_fk list
-  leg_fk pose left_leg --version v2_5 --degrees 0 10 0 -30 -15 5
-  leg_fk explain left_leg --version v2_5
+  leg_fk pose left_leg --degrees 0 10 0 -30 -15 5
+  leg_fk explain left_leg
   leg_fk bag walking.mcap walking_with_poses.mcap --version v2_5
   leg_fk plot walking.mcap -o feet.png
   leg_fk compare my_robot.urdf
@@ -115,7 +116,8 @@ def _run(words: list[str]) -> int:
             parser = parsers[words[0]]
             parser.refuse_unknown_options(words[1:])
             args = parser.parse_intermixed_args(words[1:])  # as in: bag IN --twist OUT
-            return int(args.run(args))
+            with stop_on_signals():
+                return int(args.run(args))
         if words and not words[0].startswith('-'):
             raise UnknownNameError('command', words[0], COMMANDS)
         parser.parse_args(words or ['-h'])

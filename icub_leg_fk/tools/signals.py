@@ -21,10 +21,7 @@ def stop_on_signals() -> Iterator[None]:
 
 @contextmanager
 def held_signals() -> Iterator[None]:
-    """While it lasts, the signals that end the process wait; they are the main thread's alone."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
+    """While it lasts, the signals that end the process wait."""
     arrived: list[int] = []
     try:
         with _handled((signal.SIGINT, signal.SIGTERM, signal.SIGHUP),
@@ -37,6 +34,8 @@ def held_signals() -> Iterator[None]:
 
 @contextmanager
 def _handled(numbers: Iterable[int], handler: Callable[..., None]) -> Iterator[None]:
+    if threading.current_thread() is not threading.main_thread():  # signals are that one's alone
+        numbers = ()
     before = {number: signal.signal(number, handler) for number in numbers}
     try:
         yield
