@@ -51,13 +51,12 @@ def _soak(pid: int, minutes: float) -> list[str]:
           '  time s  messages     lost   memory MB   CPU us/message   latency p50 us')
     windows: list[dict[str, float]] = []
     start = time.monotonic()
-    interrupted = False
-    while not interrupted and (left := start + 60 * minutes - time.monotonic()) > 0:
+    while (left := start + 60 * minutes - time.monotonic()) > 0:
         cpu, sent = cpu_ns(pid), robot.sent
         try:
             robot.run(min(WINDOW, left))
         except KeyboardInterrupt:
-            interrupted = True
+            minutes = 0.0
         latencies, robot.latencies = robot.latencies or [0.0], []
         windows.append({
             'time': time.monotonic() - start, 'messages': robot.sent, 'lost': robot.lost,

@@ -173,7 +173,11 @@ class _Job:
         """Copy the messages, each joint state followed by what it gives."""
         for key, value in (self._reader.storage.metadata.custom or {}).items():
             writer.set_custom_data(key, str(value))
-        copies = {connection.id: self._copy(writer, connection) for connection in self._kept}
+        copies = {connection.id: writer.add_connection(
+            connection.topic, connection.msgtype, msgdef=connection.msgdef.data,
+            rihs01=connection.digest or self._hash_of(connection), serialization_format='cdr',
+            offered_qos_profiles=connection.ext.offered_qos_profiles)
+            for connection in self._kept}
         wanted = [connection for connection in self._reader.connections
                   if connection.id in copies or connection.id in self._joint_ids]
         stream, write, feed = self._stream(writer, copies), writer.write, self._input.feed
@@ -210,9 +214,8 @@ class _Job:
     def summary(self, target: str, took: float) -> Summary:
         """Return what has been done."""
         joint_input = self._input
-        held_back = {chain.name: {
-            reason: (count, ', '.join(f'{joint} {what}' for joint, what in
-                                      counts.joints.get(reason, {}).items()))
+        held_back = {chain.name: {reason: (count, ', '.join(
+            f'{joint} {what}' for joint, what in counts.joints.get(reason, {}).items()))
             for reason, count in counts.held_back.items()}
             for chain, counts in zip(joint_input.chains, joint_input.chain_counts)}
         return Summary(
@@ -237,13 +240,6 @@ class _Job:
                    for chain in chains]
         return PoseStream(chains, self._configuration.frame_prefix, senders, sender(TF_TOPIC),
                           self._input.note_no_velocity)
-
-    def _copy(self, writer: Any, connection: Any) -> Any:
-        """Add a connection like one of the source."""
-        return writer.add_connection(
-            connection.topic, connection.msgtype, msgdef=connection.msgdef.data,
-            rihs01=connection.digest or self._hash_of(connection), serialization_format='cdr',
-            offered_qos_profiles=connection.ext.offered_qos_profiles)
 
     def _add(self, writer: Any, topic: str, kind: str, copies: Mapping[int, Any]) -> Any:
         """Return the connection of what is added: one that is copied, or a new one."""

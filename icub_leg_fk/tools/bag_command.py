@@ -18,17 +18,15 @@ from icub_leg_fk.tools.bag import add_foot_poses, STORAGES, Summary
 from icub_leg_fk.tools.text import columns, indented
 
 EXAMPLES = """\
-Reads rosbag2 bags by rosbags: mcap and sqlite3, split and compressed ones too, directories or
-single files. Copies every topic as it is and adds /foot_pose_publisher/<tip>/pose behind each
-message of joint states, by the node's own rules and byte for byte what the node would send; a
-message with a zero stamp is stamped with the time it was recorded at. OUT is a directory, or a
-single file if it ends in .mcap or .db3. It appears when it is complete.
+Reads rosbag2 bags, split and compressed ones too, as directories or single files. Copies every
+topic as it is and adds /foot_pose_publisher/<tip>/pose behind each message of joint states, byte
+for byte what the node would send; one with a zero stamp is stamped with the time it was recorded
+at. OUT is a directory, or a file if it ends in .mcap or .db3. It appears when it is complete.
 
 examples:
   leg_fk bag walking walking_with_poses
   leg_fk bag walking.mcap walking_with_poses.mcap --version v1 --foot-frame sole
   leg_fk bag walking poses --only-poses --twist --tf --storage mcap
-  leg_fk bag head head_poses --chains head_imu --version v2
   leg_fk bag walking all_poses --chains left_leg head_imu --chain-version head_imu=v2
   leg_fk bag monday/* --out-dir with_poses --jobs 4"""
 
@@ -135,20 +133,16 @@ def _tasks(args: argparse.Namespace) -> list[tuple[Path, Path]]:
         out_dir.mkdir(exist_ok=True)
     except OSError as error:
         raise OutputFileError(f'--out-dir {out_dir}: {error.strerror}') from error
-    tasks = [(Path(bag), out_dir / _name(Path(bag), args.storage)) for bag in args.bags]
-    targets = [target for _, target in tasks]
-    for target in targets:
-        if targets.count(target) > 1:
+    endings = {storage: ending for ending, storage in STORAGES.items()}
+    tasks: dict[Path, Path] = {}  # source by target
+    for bag in args.bags:
+        path = Path(os.path.abspath(bag))
+        if args.storage and path.suffix in STORAGES:
+            path = path.with_suffix(endings[args.storage])
+        if (target := out_dir / path.name) in tasks:
             raise OutputFileError(f'{target}: several bags would get this name; allowed: one')
-    return tasks
-
-
-def _name(bag: Path, storage: str) -> str:
-    """Return the name of the new bag: that of the old one, with the ending of its storage."""
-    path = Path(os.path.abspath(bag))
-    endings = {name: ending for ending, name in STORAGES.items()}
-    return (path.with_suffix(endings[storage]) if storage and path.suffix in STORAGES else path
-            ).name
+        tasks[target] = Path(bag)
+    return [(source, target) for target, source in tasks.items()]
 
 
 def _positive_integer(text: str) -> int:

@@ -33,7 +33,6 @@ AXIS_COLORS = ('#d62728', '#2ca02c', '#1f5fd0')  # x red, y green, z blue, as vi
 INK, FAINT, GRID, FLOOR = '#222222', '#6f6f6f', '#dddddd', '#f7f7f7'
 _LEFT, _RIGHT = '#6a3d9a', '#e08214'  # told apart in every kind of colour vision
 _OTHERS = ('#00798c', '#8c6d31', '#a8437c')
-_MINUS = '\N{MINUS SIGN}'
 _WIDTH, _HEIGHT, _ROW = 13.333, 7.5, 0.3  # inches; a slide, and a row of bars
 _COLUMNS = 800  # of a panel
 _MOST_SAMPLES = 4 * _COLUMNS  # of a curve; more cannot be seen and become a band
@@ -142,7 +141,7 @@ def outside_ranges(track: ChainTrack) -> list[tuple[str, list[tuple[float, float
                 value = f'{limit:g} m' if link.is_prismatic else f'{math.degrees(limit):g}°'
                 ends = np.minimum(np.flatnonzero(np.diff([False, *outside, False])), last)
                 spans = [(start, end) for start, end in track.times[ends].reshape(-1, 2).tolist()]
-                found.append((f'{name} {sign} {value}'.replace('-', _MINUS), spans))
+                found.append((f'{name} {sign} {value}'.replace('-', '\N{MINUS SIGN}'), spans))
     return found
 
 
@@ -154,10 +153,9 @@ def gaps(tracks: Sequence[ChainTrack]) -> list[tuple[float, float]]:
 
 def color_of(chain: Chain) -> str:
     """Return a chain's colour: one for everything left, one for everything right."""
-    for word, color in (('left', _LEFT), ('right', _RIGHT)):
-        if word in chain.tip or word in chain.name:
-            return color
-    return _OTHERS[sum(map(ord, chain.name)) % len(_OTHERS)]
+    return next((color for word, color in (('left', _LEFT), ('right', _RIGHT))
+                 if word in chain.tip + chain.name),
+                _OTHERS[sum(map(ord, chain.name)) % len(_OTHERS)])
 
 
 class Space:
@@ -178,7 +176,9 @@ class Space:
             math.cos(el) * math.cos(az), math.cos(el) * math.sin(az), math.sin(el)])
         self._rightward = np.array([-math.sin(az), math.cos(az), 0.0])
         points = np.vstack((points, np.zeros((1, 3))))
-        self.step = _round_step(float(np.ptp(points, axis=0).max()) / 7)
+        least = max(float(np.ptp(points, axis=0).max()) / 7, 1e-4)
+        decade = 10.0 ** math.floor(math.log10(least))  # the step is 0.1, 0.2, 0.5, 1 or the like
+        self.step = next(decade * round_ for round_ in (1, 2, 5, 10) if decade * round_ >= least)
         lowest = np.floor(points.min(axis=0) / self.step - 1) * self.step
         highest = np.ceil(points.max(axis=0) / self.step + 1) * self.step
         lowest[2] = low = float(points[:, 2].min())
@@ -235,7 +235,6 @@ class Space:
 
 def _draw_scene(space: Space, scene: Sequence[tuple[ChainTrack, int]],
                 soles: Mapping[str, Chain]) -> None:
-    """Draw chains, each at one of its samples, and their tips' paths around these."""
     space.frame(np.eye(4), 1.2 * space.step, 90)
     nearest_last = sorted(scene, key=lambda sample: space.depth(
         sample[0].chain.frames(sample[0].positions[sample[1]])[:, :3, 3]))
@@ -249,7 +248,6 @@ def _draw_scene(space: Space, scene: Sequence[tuple[ChainTrack, int]],
 
 
 def _draw_tips(panels: Sequence[Axes], tracks: Sequence[ChainTrack]) -> None:
-    """Draw one coordinate of every tip against time into each of three panels."""
     found = gaps(tracks)
     for panel, (name, column) in zip(panels, (('z', 2), ('x', 0), ('y', 1)), strict=True):
         for track in tracks:
@@ -266,7 +264,6 @@ def _draw_tips(panels: Sequence[Axes], tracks: Sequence[ChainTrack]) -> None:
 
 
 def _notes(tracks: Sequence[ChainTrack]) -> str:
-    """Say what the panels show beside the curves."""
     notes = [] if any(map(outside_ranges, tracks)) else ['all joints inside their ranges']
     if found := gaps(tracks):
         notes.append(f'grey: no pose, {max(b - a for a, b in found):.2f} s at most')
@@ -309,7 +306,6 @@ def _draw_outside_ranges(panel: Axes, rows: Sequence[tuple[Chain, str, list[tupl
 
 
 def _mark_instants(panels: Sequence[Axes], instants: Sequence[float]) -> None:
-    """Mark instants by dotted lines, and by letters at the top of the first panel."""
     start, end = panels[0].get_xlim()
     for panel in panels:
         for instant in instants:
@@ -329,9 +325,3 @@ def _breaks(times: Array) -> NDArray[np.intp]:
     forward = steps[steps > 0]
     usual = np.median(forward) if len(forward) > 1 else np.inf
     return np.flatnonzero((steps > _GAP * usual) | (steps < 0)) + 1
-
-
-def _round_step(least: float) -> float:
-    """Return the smallest of ... 0.05, 0.1, 0.2, 0.5, 1 ... that is not below `least` [m]."""
-    decade = 10.0 ** math.floor(math.log10(max(least, 1e-4)))
-    return next(decade * factor for factor in (1, 2, 5, 10) if decade * factor >= least)

@@ -44,8 +44,6 @@ _PREAMBLE = [r'\documentclass[10pt]{article}',
              r'\usepackage[a4paper,landscape,margin=15mm]{geometry}', r'\usepackage{amsmath}',
              r'\allowdisplaybreaks', r'\setlength{\parindent}{0pt}', r'\begin{document}']
 
-Block = tuple[Any, ...]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
@@ -110,7 +108,7 @@ def as_latex(e: Explanation) -> str:
     return '\n'.join([*lines, r'\end{document}'])
 
 
-def _blocks(e: Explanation) -> Iterator[Block]:
+def _blocks(e: Explanation) -> Iterator[Any]:
     """Yield the whole explanation.
 
     `title`, `heading`, `words` and `aside` have a text, `table` rows of a header and rows,
@@ -150,7 +148,7 @@ def _blocks(e: Explanation) -> Iterator[Block]:
             yield 'words', note
 
 
-def _frames(e: Explanation) -> Iterator[Block]:
+def _frames(e: Explanation) -> Iterator[Any]:
     """Yield steps 1 to 4: the axes and origins of all frames."""
     n, modified = len(e.steps), e.is_modified
     at = f'coordinates in {e.chain.root_frame}, at {"q = 0" if e.q is None else "this q"}'
@@ -189,7 +187,7 @@ def _origin(e: Explanation, i: int) -> str:
             f'{other} and `z_{i}` meet here')
 
 
-def _table(e: Explanation) -> Iterator[Block]:
+def _table(e: Explanation) -> Iterator[Any]:
     """Yield step 5: the table as the documents print it, its errata, the general matrix."""
     rows = []
     for step in e.steps:
@@ -274,7 +272,9 @@ def _text_equation(e: Explanation, name: str, *matrices: Matrix) -> list[str]:
     """Return a product of matrices, or the entries of one that is too wide."""
     written = [text.matrix([[' '.join(_terms(cell)) for cell in row] for row in T],
                            '  ' if len(matrices) == 1 else ' ') for T in matrices]
-    lines = text.indented(text.beside(f'{name} ='.strip(), *written))
+    words = f'  {name} =' if name else '  ='
+    gap = ' ' * len(words)
+    lines = [' '.join(row) for row in zip((gap, words, gap, gap), *written)]
     if max(map(len, lines)) <= text.WIDTH or len(matrices) > 1:
         return lines
     lines = [f'  {name} =']

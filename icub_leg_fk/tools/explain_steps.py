@@ -1,14 +1,11 @@
 """What `leg_fk explain` tells: the Denavit-Hartenberg method, worked out for one chain.
 
 Lengths are millimetres here, as in the printed tables. Rows count from i = 0, so row i is the
-transform A_i = T_i(i+1) = Rz(theta_i) tz(d_i) tx(a_i) Rx(alpha_i) from frame i+1 to frame i; in
-Craig's convention it is Rx(alpha_i) tx(a_i) Rz(theta_i) tz(d_i).
-
-An entry of a matrix is a float, or where the answer is to be exact a sympy expression, with c_i
-and s_i for cosine and sine of theta_i. Every product is linear in each joint's c_i and s_i, so
-nothing needs simplifying, but for joints with parallel axes: Rz(theta_3) Rx(pi) Rz(theta_4) is
-Rz(theta_3 - theta_4) Rx(pi). Such angles are added up while multiplying, and appear as c_34 and
-s_34, or c_3m4 and s_3m4 for a difference.
+transform A_i = T_i(i+1) from frame i+1 to frame i. An entry of a matrix is a float, or where the
+answer is to be exact a sympy expression, with c_i and s_i for cosine and sine of theta_i. Every
+product is linear in each joint's c_i and s_i, so nothing needs simplifying, but for joints with
+parallel axes: Rz(theta_3) Rx(pi) Rz(theta_4) is Rz(theta_3 - theta_4) Rx(pi). Such angles are
+added up while multiplying, and appear as c_34 and s_34, or c_3m4 and s_3m4 for a difference.
 """
 
 from collections.abc import Iterator, Sequence

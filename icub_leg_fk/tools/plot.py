@@ -16,9 +16,9 @@ import numpy as np
 
 EXAMPLES = """\
 INPUT is a rosbag2 bag (directory, .mcap or .db3) with JointState messages, read by the node's
-own rules, or a CSV file with a column `time` in seconds and one column per joint, in radians;
-other columns are ignored. Gaps and joints outside their ranges are marked. Where samples are
-closer together than can be drawn, a curve becomes the band from its lowest to its highest values.
+own rules, or a CSV file with a column `time` in seconds and one column per joint, in radians.
+Gaps and joints outside their ranges are marked. Where samples are closer together than can be
+drawn, a curve becomes the band from its lowest to its highest values.
 
 examples:
   leg_fk plot walking.csv
@@ -61,7 +61,14 @@ def run(args: argparse.Namespace) -> int:
     if len(roots := {chain.root_frame for chain in chains}) > 1:
         raise LegFKError(f'--chains: found the root frames {", ".join(sorted(roots))}, allowed: '
                          'chains of one root frame')
-    tracks, poseless = _read(args.input, chains, args.joint_topic)
+    if args.input.suffix.lower() != '.csv':
+        tracks, poseless = read_bag(args.input, chains, args.joint_topic)
+    elif args.joint_topic is None:
+        recording = read_csv(args.input, dict.fromkeys(
+            name for chain in chains for name in chain.joint_names))
+        tracks, poseless = [recording.track(chain) for chain in chains], []
+    else:
+        raise LegFKError(f'--joint-topic: {args.input} is a CSV file, which has no topics')
     tracks = _between(tracks, args.begin, args.end)
     start, end = time_span(tracks)
     if outside := [instant for instant in args.at or () if not start <= instant <= end]:
@@ -121,18 +128,6 @@ def _chosen_chains(catalog: Catalog, args: argparse.Namespace) -> list[Chain]:
     own = options.own_versions(args, names)
     return [catalog.chain(name, options.chosen_version(catalog, name, own.get(name, args.version)),
                           args.foot_frame) for name in dict.fromkeys(names)]
-
-
-def _read(path: Path, chains: Sequence[Chain], topic: str | None
-          ) -> tuple[list[ChainTrack], list[str]]:
-    """Return what the chains did, and words on those without a pose."""
-    if path.suffix.lower() != '.csv':
-        return read_bag(path, chains, topic)
-    if topic is not None:
-        raise LegFKError(f'--joint-topic: {path} is a CSV file, which has no topics')
-    recording = read_csv(path, dict.fromkeys(
-        name for chain in chains for name in chain.joint_names))
-    return [recording.track(chain) for chain in chains], []
 
 
 def _between(tracks: Sequence[ChainTrack], begin: float | None, end: float | None

@@ -13,8 +13,6 @@ from icub_leg_fk.kinematics import Chain, DHLink
 WIDTH = 98
 _UNLIKELY = 10.0  # m; of a joint's position, which may have been meant in mm
 
-Rows = Sequence[Sequence[str]]
-
 
 def fixed(value: float, decimals: int) -> str:
     """Return a number with exactly so many decimals, and without a negative zero."""
@@ -54,7 +52,8 @@ def range_notes(chain: Chain, q: Sequence[float]) -> list[str]:
     return notes
 
 
-def columns(rows: Rows, gap: str = '  ', header: Sequence[str] = ()) -> list[str]:
+def columns(rows: Sequence[Sequence[str]], gap: str = '  ', header: Sequence[str] = ()
+            ) -> list[str]:
     """Return the rows as lines; numbers stand with their points under each other."""
     aligned = [_aligned(column) for column in zip(*rows, strict=True)]
     if header:
@@ -62,28 +61,15 @@ def columns(rows: Rows, gap: str = '  ', header: Sequence[str] = ()) -> list[str
     return [gap.join(cells).rstrip() for cells in zip(*aligned, strict=True)]
 
 
-def matrix(rows: Rows, gap: str = ' ') -> list[str]:
+def matrix(rows: Sequence[Sequence[str]], gap: str = ' ') -> list[str]:
     """Return the lines of a matrix in brackets."""
     aligned = [_aligned(column, centred=True) for column in zip(*rows, strict=True)]
     return [f'[{gap.join(cells)}]' for cells in zip(*aligned, strict=True)]
 
 
-def beside(*blocks: str | Sequence[str], gap: str = ' ') -> list[str]:
-    """Return blocks of lines side by side, words in the middle of the tallest block."""
-    height = max(1 if isinstance(block, str) else len(block) for block in blocks)
-    padded = []
-    for block in blocks:
-        lines = [block] if isinstance(block, str) else list(block)
-        above = (height - len(lines)) // 2
-        lines = [''] * above + lines + [''] * (height - len(lines) - above)
-        width = max(map(len, lines))
-        padded.append([line.ljust(width) for line in lines])
-    return [gap.join(parts).rstrip() for parts in zip(*padded, strict=True)]
-
-
-def indented(lines: Iterable[str], by: int = 2) -> list[str]:
+def indented(lines: Iterable[str]) -> list[str]:
     """Return the lines moved to the right."""
-    return [' ' * by + line if line else '' for line in lines]
+    return [f'  {line}' for line in lines]
 
 
 def wrapped(text: str) -> list[str]:
