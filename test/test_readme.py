@@ -74,7 +74,7 @@ def test_every_command_has_arguments_that_are_known(page):
         words = shlex.split(command)
         if 'leg_fk' in words[:4]:
             words = words[words.index('leg_fk') + 1:]
-            leg_fk._parser(words).parse_args(words)
+            leg_fk.parse(words)
 
 
 def parameters() -> dict[str, object]:

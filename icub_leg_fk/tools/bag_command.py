@@ -153,17 +153,17 @@ def _positive_integer(text: str) -> int:
 
 def _summary_lines(summary: Summary) -> list[str]:
     """Return the closing summary, line by line."""
-    rows = [(str(summary.copied), 'messages copied')]
-    rows += [(str(count), f'added on {topic}') for topic, count in summary.added.items()]
-    rows += [(str(count), 'time steps back: held joints forgotten' if reason == 'time_jump'
-              else f'joint states rejected: {reason}')
-             for reason, count in summary.rejected.items()]
-    rows += [(str(count), f'joint states gave no {"twist" if reason == "no_velocity" else "pose"} '
-              f'of {chain}: {reason} ({joints})')
-             for chain, reasons in summary.held_back.items()
-             for reason, (count, joints) in reasons.items()]
-    lines = [f'{summary.source} -> {summary.target}', *indented(columns(rows))]
-    lines += indented([f'note: {note}' for note in summary.notes])
+    rows = [(str(summary.copied), 'messages copied'),
+            *((str(count), f'added on {topic}') for topic, count in summary.added.items()),
+            *((str(count), 'time steps back: held joints forgotten' if reason == 'time_jump'
+               else f'joint states rejected: {reason}')
+              for reason, count in summary.rejected.items()),
+            *((str(count), f'joint states gave no {"twist" if reason == "no_velocity" else "pose"}'
+               f' of {chain}: {reason} ({joints})')
+              for chain, reasons in summary.held_back.items()
+              for reason, (count, joints) in reasons.items())]
     speed = summary.recorded / max(summary.took, 1e-9)
-    return [*lines, f'  {summary.recorded:.3f} s of recording in {summary.took:.3f} s, '
-            f'{speed:.1f} seconds of recording per second']
+    return [f'{summary.source} -> {summary.target}', *indented([
+        *columns(rows), *(f'note: {note}' for note in summary.notes),
+        f'{summary.recorded:.3f} s of recording in {summary.took:.3f} s, {speed:.1f} seconds of '
+        'recording per second'])]

@@ -19,7 +19,7 @@ DEFAULT_TOPIC = '/joint_states'
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 METADATA = 'metadata.yaml'
 
-_TAIL = 1 << 20  # bytes of an MCAP file, in which its summary is
+_TAIL = 1 << 20  # bytes of an MCAP file, with its summary
 _CLEAN = re.compile(r'/?(?!/)[A-Za-z0-9._/ +@:,=-]*')  # what also sqlite takes as it is
 _MEND = {'.mcap': '`mcap recover` may mend it', '.db3': '`ros2 bag reindex` may mend it'}
 
@@ -37,11 +37,7 @@ def import_rosbags() -> tuple[Any, Any]:
 
 @contextmanager
 def open_bag(path: str | Path) -> Iterator[Any]:
-    """Give a rosbags reader of a rosbag2 directory or of one of its files.
-
-    Raises:
-        InputFileError: there is nothing that can be read; says why, and what mends it.
-    """
+    """Give a rosbags reader of a rosbag2 directory or of one of its files."""
     path, (rosbag2, _) = Path(path), import_rosbags()
     shown = os.fsencode(path).decode(errors='backslashreplace')
     _look_first(path, shown)
@@ -66,11 +62,7 @@ def open_bag(path: str | Path) -> Iterator[Any]:
 
 def messages(reader: Any, path: str | Path, connections: Sequence[Any]
              ) -> Iterator[tuple[Any, int, bytes]]:
-    """Yield connection, time of recording [ns] and CDR bytes of each message.
-
-    Raises:
-        InputFileError: the recording is damaged; says how, and what mends it.
-    """
+    """Yield connection, time of recording [ns] and CDR bytes of each message."""
     try:
         yield from reader.messages(connections=connections)
     except Exception as error:
@@ -78,10 +70,7 @@ def messages(reader: Any, path: str | Path, connections: Sequence[Any]
 
 
 def joint_connections(reader: Any, path: str | Path, topic: str | None) -> list[Any]:
-    """Return the connections of a topic of joint states.
-
-    If None, the topic is `/joint_states`, or the only one there is.
-    """
+    """Return the connections of a topic, or else `/joint_states`, or the only one there is."""
     connections = [connection for connection in reader.connections
                    if connection.msgtype == JOINT_STATE]
     known = sorted({connection.topic for connection in connections})

@@ -35,7 +35,6 @@ examples:
   leg_fk demo --version v1 --seconds 3 -o v1.png
   leg_fk demo --recording walking.csv"""
 
-_INTERRUPTED = 128 + 2  # as a shell reports SIGINT
 _COLUMNS = ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
 _COLORS = {'left foot': '\x1b[38;5;97m', 'right foot': '\x1b[38;5;172m', '': '\x1b[2m'}
 
@@ -117,13 +116,11 @@ def conclude(answers: Sequence[Answers], times: Sequence[float], whole: bool) ->
 
     `times` [s] are those of the messages sent, `whole` tells whether all were.
     """
-    sent = len(times)
-    arrived = sum(answer.arrived for answer in answers)
+    sent, arrived = len(times), sum(answer.arrived for answer in answers)
     lost = sent * len(answers) - arrived
     unexpected = sum(answer.unexpected for answer in answers)
-    latencies = np.concatenate([answer.latencies for answer in answers]) * 1e3
     latency = 'none' if not arrived else 'median {:.2f} ms   p99 {:.2f} ms   max {:.2f} ms'.format(
-        *np.nanpercentile(latencies, (50, 99, 100)))
+        *1e3 * np.nanpercentile([answer.latencies for answer in answers], (50, 99, 100)))
     missing = (f'lost          {lost or "none"}' if whole
                else f'interrupted   {lost} of the poses had not arrived; no picture, no bag')
     print(f'\nmessages in   {sent}  in {times[-1] - times[0] if sent else 0.0:.2f} s\n'
@@ -134,7 +131,7 @@ def conclude(answers: Sequence[Answers], times: Sequence[float], whole: bool) ->
         print(f'leg_fk: error: of {sent * len(answers)} poses {lost} did not arrive, and '
               f'{unexpected} arrived that belong to no message', file=sys.stderr)
         return 1
-    return 0 if whole else _INTERRUPTED
+    return 0 if whole else 128 + 2  # as a shell reports SIGINT
 
 
 class LiveTable:
@@ -190,6 +187,6 @@ class LiveTable:
                 if answers.arrived else '  no pose yet')))
         if len(shown) < len(_COLUMNS):
             rows.append(('', f'{len(_COLUMNS) - len(shown)} more columns: widen the terminal'))
-        arrived = sum(answers.arrived for answers in self._feet.values())
-        return [*rows, ('', ''), ('', f'{self._elapsed:.2f} of {self._seconds:.2f} s, {arrived} '
-                                  'poses')]
+        poses = sum(answers.arrived for answers in self._feet.values())
+        return [*rows, ('', ''),
+                ('', f'{self._elapsed:.2f} of {self._seconds:.2f} s, {poses} poses')]

@@ -148,10 +148,9 @@ class Replay:
         self._context.try_shutdown()
 
     def wait_for_node(self, check: Callable[[], None]) -> None:
-        """Wait until the node and this process have found each other, in both directions.
+        """Send messages, which do not count, until each tip has answered one.
 
-        To that end, single messages are sent, which do not count, until each tip has answered
-        one. `check` is called again and again, and raises if there is no hope.
+        `check` is called again and again, and raises if there is no hope.
         """
         deadline = time.monotonic() + _DISCOVERY_TIMEOUT
         while len(self._found) < len(self.answers):

@@ -1,7 +1,6 @@
 """Pictures of chains: their tips over time, and the chains in space at some instants.
 
-matplotlib takes nothing from the user's settings, and pyplot, which would want a display, is left
-alone.
+matplotlib takes nothing from the user's settings, and pyplot, which wants a display, is not used.
 """
 
 from __future__ import annotations
@@ -80,8 +79,7 @@ def check_output(path: Path, force: bool) -> None:
 def save_picture(draw: Callable[[], Figure], path: Path, *, force: bool, dpi: int = 150) -> None:
     """Draw a picture and write it in the format that its ending names, whole or not at all."""
     kind = path.suffix.lower().lstrip('.')
-    # Without dates the same picture is the same file.
-    metadata = {'svg': {'Date': None}, 'pdf': {'CreationDate': None}}.get(kind)
+    metadata = {'svg': {'Date': None}, 'pdf': {'CreationDate': None}}.get(kind)  # no dates
     try:
         with _plain_matplotlib(), whole_path(path, force=force) as new:
             draw().savefig(new, format=kind, dpi=dpi, metadata=metadata)

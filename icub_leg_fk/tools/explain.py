@@ -97,9 +97,8 @@ def as_latex(e: Explanation) -> str:
         elif kind == 'table':
             header, rows = ([' & '.join(map(_mixed, row)) + r' \\' for row in part]
                             for part in parts)
-            lines += [r'\begin{center}', rf'\begin{{tabular}}{{{"l" * len(parts[1][0])}}}',
-                      *header, *[r'\hline'] * len(header), *rows, r'\end{tabular}',
-                      r'\end{center}']
+            lines += [rf'\begin{{center}}\begin{{tabular}}{{{"l" * len(parts[1][0])}}}', *header,
+                      *[r'\hline'] * len(header), *rows, r'\end{tabular}\end{center}']
         elif kind in ('title', 'heading'):
             level = 'section' if kind == 'title' else 'subsection'
             lines.append(rf'\{level}*{{{_mixed(parts[0])}}}')
@@ -285,7 +284,6 @@ def _text_equation(e: Explanation, name: str, *matrices: Matrix) -> list[str]:
 
 
 def _latex_equation(name: str, *matrices: Matrix) -> list[str]:
-    """Return a product of matrices, or the entries of one that is too wide."""
     written = [[' & '.join(' '.join(_terms(cell, _latex)) for cell in row) for row in T]
                for T in matrices]
     if max(len(row) for T in written for row in T) <= _WIDE or len(matrices) > 1:

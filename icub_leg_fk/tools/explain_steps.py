@@ -187,10 +187,7 @@ class _Algebra:
 
 def work_out(version: ChainVersion, chain: Chain, foot_frame: str | None,
              q: Sequence[float] | None, exact: bool) -> Explanation:
-    """Work a chain out, step by step, for a joint vector [rad or m] or, if None, for symbols.
-
-    Numbers stay exact where joints are symbols, or on request, which needs sympy.
-    """
+    """Work a chain out for a joint vector [rad or m], or for symbols, which are exact."""
     algebra, decimals = _Algebra(exact or q is None), _Algebra(False)
     steps = _steps(chain, q, algebra)
     tip, sole = _TIP_SYMBOLS.get(chain.tip, ('E', 'S'))

@@ -44,8 +44,6 @@ examples:
 
 `leg_fk COMMAND -h` explains a command and shows more examples."""
 
-INTERRUPTED = 128 + 2  # as a shell reports SIGINT
-PIPE_CLOSED = 128 + 13  # and SIGPIPE
 _NEGATIVE = re.compile(r'-(inf|nan|(\d+\.?\d*|\.\d+)(e[-+]?\d+)?)(,|$)', re.IGNORECASE)
 
 
@@ -93,10 +91,10 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stdout.flush()
         return status
     except KeyboardInterrupt:
-        return INTERRUPTED
+        return 128 + 2  # as a shell reports SIGINT
     except BrokenPipeError:
         _forget_output()
-        return PIPE_CLOSED
+        return 128 + 13  # as it does SIGPIPE
     except (LegFKError, OSError) as error:
         print(f'leg_fk: error: {" ".join(str(error).split())}', file=sys.stderr)
         if isinstance(error, OSError):
@@ -105,20 +103,23 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(words: list[str]) -> int:
-    parser, parsers = _parsers(words)
     try:
-        if words and words[0] in parsers:
-            parser = parsers[words[0]]
-            parser.refuse_unknown_options(words[1:])
-            args = parser.parse_intermixed_args(words[1:])  # as in: bag IN --twist OUT
-            with stop_on_signals():
-                return int(args.run(args))
-        if words and not words[0].startswith('-'):
-            raise UnknownNameError('command', words[0], COMMANDS)
-        parser.parse_args(words or ['-h'])
-    except SystemExit as done:  # -h and --version
+        args = parse(words)
+        with stop_on_signals():
+            return int(args.run(args))
+    except SystemExit as done:  # -h and --version, and signals
         return int(done.code or 0)
-    return 0
+
+
+def parse(words: list[str]) -> argparse.Namespace:
+    """Return what the words of the command say; `run` is what carries it out."""
+    parser, parsers = _parsers(words)
+    if words and words[0] in parsers:
+        parsers[words[0]].refuse_unknown_options(words[1:])
+        return parsers[words[0]].parse_intermixed_args(words[1:])  # as in: bag IN --twist OUT
+    if words and not words[0].startswith('-'):
+        raise UnknownNameError('command', words[0], COMMANDS)
+    return parser.parse_args(words or ['-h'])
 
 
 def _parsers(words: Sequence[str]) -> tuple[Parser, dict[str, Parser]]:

@@ -9,8 +9,7 @@ from icub_leg_fk.tools import options, text
 EXAMPLES = """\
 examples:
   leg_fk list
-  leg_fk list -k my_robot.yaml
-  leg_fk list --json"""
+  leg_fk list -k my_robot.yaml"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

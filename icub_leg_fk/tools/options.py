@@ -22,12 +22,9 @@ def _chain_version(text: str) -> tuple[str, str]:
 
 
 _OPTIONS: dict[str, dict[str, Any]] = {
-    'chain': {'metavar': 'CHAIN',
-              'help': 'a chain of the kinematics file, such as left_leg (see leg_fk list)'},
-    '--chains': {'metavar': 'CHAIN', 'nargs': '+',
-                 'help': 'chains of the kinematics file (default: left_leg right_leg)'},
-    '--version': {'metavar': 'VERSION',
-                  'help': f'version of the tables (default: {DEFAULT_VERSION})'},
+    'chain': {'metavar': 'CHAIN', 'help': 'a chain, such as left_leg (leg_fk list shows them)'},
+    '--chains': {'metavar': 'CHAIN', 'nargs': '+', 'help': 'chains (default: both legs)'},
+    '--version': {'metavar': 'VERSION', 'help': f'of the tables (default: {DEFAULT_VERSION})'},
     '--chain-version': {'metavar': 'CHAIN=VERSION', 'action': 'append', 'default': [],
                         'type': _chain_version,
                         'help': 'version of one chain; may stand several times'},

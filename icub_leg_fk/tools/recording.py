@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 
 TIMES = ('time', 'Time', 'timestamp')
 EPOCH = 1e8  # s; times beyond it count from 1970 and not from the start
-_DELIMITERS = ',;\t'
 
 
 @dataclass(frozen=True)
@@ -77,8 +76,7 @@ def read_bag(path: Path, chains: Sequence[Chain], topic: str | None
              ) -> tuple[list[ChainTrack], list[str]]:
     """Return what some chains did in a bag, by the node's own input rules.
 
-    Chains without a pose are in words, with what was missing. The topic of the joint states is
-    `/joint_states`, or the only one there is, if None.
+    Chains without a pose are in words, with what was missing.
     """
     stamps = [array('q') for _ in chains]
     positions = [array('d') for _ in chains]
@@ -121,7 +119,7 @@ def read_csv(path: str | Path, joint_names: Iterable[str]) -> JointRecording:
         with open(path, encoding='utf-8-sig', newline='') as stream:
             header = stream.readline()
             stream.seek(0)
-            reader = csv.reader(stream, delimiter=max(_DELIMITERS, key=header.count))
+            reader = csv.reader(stream, delimiter=max(',;\t', key=header.count))
             for row in _rows(str(path), reader, joints):
                 values.extend(row)
     except OSError as error:

@@ -74,8 +74,7 @@ def urdf_text(robot: str, tables: Mapping[tuple[str, str], ChainVersion]) -> str
     """Return the URDF of a robot of some chains, at least one, by chain and version.
 
     Raises:
-        LegFKError: the chains have different roots or share a name, or a prismatic joint has no
-            range, which a URDF must state.
+        LegFKError: the chains have different roots or share a name, or a joint has no range.
     """
     roots = sorted({table.root_frame for table in tables.values()})
     if len(roots) > 1:
@@ -119,8 +118,7 @@ def _add_chain(model: ET.Element, joints: dict[str, tuple[str, DHLink, Array]], 
                table: ChainVersion) -> None:
     """Add a chain; `joints` are those that are there, with parent and origin: each is there once.
 
-    Raises:
-        LegFKError: a joint is elsewhere in another chain.
+    A joint that is elsewhere in another chain is refused.
     """
     origin, parent = table.T_root_0, table.root_frame
     names = iter(table.joint_names)
