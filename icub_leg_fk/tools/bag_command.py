@@ -37,8 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                     '       leg_fk bag IN... --out-dir DIR [--jobs N] [options]')
     parser.add_argument('bags', metavar='BAG', nargs='+', help='the bag to read and the bag to '
                         'make; with --out-dir, all are bags to read')
-    parser.add_argument('--out-dir', metavar='DIR', help='make a bag of the same name in DIR of '
-                        'every bag')
+    parser.add_argument('--out-dir', metavar='DIR', help='where each gets one of the same name')
     parser.add_argument('--jobs', metavar='N', type=_positive_integer, default=1,
                         help='bags to work on at a time (default: 1)')
     options.add(parser, '--chains', '--version', '--chain-version', '--foot-frame',

@@ -156,7 +156,7 @@ def _encodings_of_other_mcap(file: Path) -> dict[str, str]:
     if profile == b'ros2' or not head.startswith(b'\x89MCAP0\r\n'):
         return {}
     return {topic.decode(): encoding.decode() for topic, encoding in re.findall(
-        rb'(/[\w/]+)[\4\x08\x0a]\0\0\0(json|ros1|cbor|protobuf|flatbuffer)', tail)}
+        rb'([!-~]+)[\4\x08\x0a]\0\0\0(json|ros1|cbor|protobuf|flatbuffer)', tail)}
 
 
 def _clean(path: Path, scratch: Path) -> Path:

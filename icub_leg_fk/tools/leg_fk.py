@@ -126,7 +126,8 @@ def _parsers(words: Sequence[str]) -> tuple[Parser, dict[str, Parser]]:
     """Return the command's parser, and its subcommands'; only the one asked for has options."""
     parser = Parser(prog='leg_fk', description=DESCRIPTION, epilog=EXAMPLES)
     parser.add_argument('--version', action='version', version=f'leg_fk {__version__}')
-    subparsers = parser.add_subparsers(title='commands', metavar='COMMAND', required=True)
+    subparsers = parser.add_subparsers(title='commands', metavar='COMMAND', required=True,
+                                       prog='leg_fk')  # argparse would import much to find it
     for name, (module_name, purpose) in COMMANDS.items():
         subparser = subparsers.add_parser(name, help=purpose, description=purpose)
         if name in words[:1]:

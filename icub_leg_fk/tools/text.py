@@ -1,7 +1,6 @@
 """Numbers, tables and matrices as text that can be checked by eye."""
 
 from collections.abc import Iterable, Sequence
-import json
 import math
 import re
 import textwrap
@@ -80,6 +79,7 @@ def wrapped(text: str) -> list[str]:
 
 def as_json(value: Any) -> str:
     """Return JSON with its innermost lists of numbers or words on one line each."""
+    import json
     try:
         text = json.dumps(value, indent=2, allow_nan=False)
     except ValueError as error:
