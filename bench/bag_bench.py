@@ -1,6 +1,7 @@
 """`leg_fk bag` beside the plain loop over rosbags: time, memory, and two jobs beside one."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 import os
 from pathlib import Path
 import shutil
@@ -12,7 +13,7 @@ import time
 from typing import NamedTuple
 
 from bench.joint_messages import joint_positions, ROBOT_JOINTS
-from bench.report import ratio, Report
+from bench.report import ratio, Report, resident_bytes
 from icub_leg_fk.errors import LegFKError
 from icub_leg_fk.tools.bag_reading import JOINT_STATE
 from icub_leg_fk.tools.recording import write_joint_states
@@ -88,9 +89,13 @@ def _time(command: Sequence[str], output: Path, one_core: bool = False) -> _Run:
     began = time.perf_counter()
     process = subprocess.Popen([*command, str(output)], stdout=subprocess.DEVNULL)
     os.sched_setaffinity(0, cores)
-    _, status, usage = os.wait4(process.pid, 0)
-    if status:
-        raise LegFKError(f'{" ".join(command)} ended with {os.waitstatus_to_exitcode(status)}')
+    peak = 0
+    while process.poll() is None:  # what wait4 tells is at least the peak of this process
+        peak = max(peak, resident_bytes(process.pid, 'VmHWM:'))
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(timeout=0.02)
     seconds = time.perf_counter() - began
+    if process.returncode:
+        raise LegFKError(f'{" ".join(command)} ended with {process.returncode}')
     shutil.rmtree(output)
-    return _Run(seconds, usage.ru_maxrss * 1024 / 1e6)
+    return _Run(seconds, peak / 1e6)

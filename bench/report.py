@@ -52,10 +52,10 @@ def cpu_ns(pid: int) -> int:
     return time.clock_gettime_ns((~pid << 3) | 2)  # as clock_getcpuclockid(3) builds the id
 
 
-def resident_bytes(pid: int) -> int:
-    """Return the resident size of a process [bytes]."""
-    status = Path(f'/proc/{pid}/status').read_text(encoding='ascii')
-    return int(status.partition('VmRSS:')[2].split()[0]) * 1024
+def resident_bytes(pid: int, key: str = 'VmRSS:') -> int:
+    """Return the resident size of a process, or with VmHWM: its peak [bytes]; 0 if it ended."""
+    _, found, value = Path(f'/proc/{pid}/status').read_text(encoding='ascii').partition(key)
+    return int(value.split()[0]) * 1024 if found else 0
 
 
 def machine() -> str:
