@@ -229,10 +229,11 @@ class _Job:
             if topic not in self._topics:
                 return None
             connection = self._add(writer, topic, self._topics[topic], copies)
+            write, added = writer.write, self._added
 
             def send(data: bytes) -> None:
-                writer.write(connection, self._time, data)
-                self._added[topic] += 1
+                write(connection, self._time, data)
+                added[topic] += 1
             return send
 
         chains = self._configuration.chains

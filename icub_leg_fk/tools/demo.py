@@ -81,8 +81,7 @@ def run(args: argparse.Namespace) -> int:
         source = args.recording.name if args.recording else 'synthetic gait'
         tracks = [replace(recording.track(chain), received=answers.poses).where(
             np.isfinite(answers.latencies)) for chain, answers in zip(chains, replay.answers)]
-        soles = {chain.name: catalog.chain(chain.name, args.version, 'sole')
-                 for chain in chains}
+        soles = {chain.name: catalog.chain(chain.name, args.version, 'sole') for chain in chains}
         title = f'{source}   {args.version}'
         save_picture(lambda: feet_figure(tracks, default_instants(tracks), title, soles),
                      picture, force=force)
