@@ -37,13 +37,23 @@ def foot_matrix(chain: Chain, q: Sequence[float]) -> Array:
 
 
 def quaternion(T: Array) -> tuple[float, float, float, float]:
-    """Return x, y, z, w of the rotation in a (4, 4) matrix, as most textbooks have it."""
-    (a, b, c, _), (d, e, f, _), (g, h, i, _), _ = T.tolist()
-    sqrt, copysign = math.sqrt, math.copysign
-    return (copysign(sqrt(max(0.0, 1.0 + a - e - i)) / 2, h - f),
-            copysign(sqrt(max(0.0, 1.0 - a + e - i)) / 2, c - g),
-            copysign(sqrt(max(0.0, 1.0 - a - e + i)) / 2, d - b),
-            sqrt(max(0.0, 1.0 + a + e + i)) / 2)
+    """Return x, y, z, w of the rotation in a (4, 4) matrix, by the largest of the four."""
+    m = T.tolist()
+    w = 1.0 + m[0][0] + m[1][1] + m[2][2]
+    x = 1.0 + m[0][0] - m[1][1] - m[2][2]
+    y = 1.0 - m[0][0] + m[1][1] - m[2][2]
+    z = 1.0 - m[0][0] - m[1][1] + m[2][2]
+    wx, wy, wz = m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]
+    xy, xz, yz = m[0][1] + m[1][0], m[0][2] + m[2][0], m[1][2] + m[2][1]
+    largest = max(w, x, y, z)
+    scale = 0.5 / math.sqrt(largest)
+    if largest == w:
+        return wx * scale, wy * scale, wz * scale, w * scale
+    if largest == x:
+        return x * scale, xy * scale, xz * scale, wx * scale
+    if largest == y:
+        return xy * scale, y * scale, yz * scale, wy * scale
+    return xz * scale, yz * scale, z * scale, wz * scale
 
 
 def add_poses(source: Path, target: Path) -> None:
