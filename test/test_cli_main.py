@@ -14,13 +14,13 @@ from leg_fk_process import assert_one_line_complaint, COMMAND, leg_fk
 import pytest
 
 
-def test_help_lists_every_command_with_one_line():
+def test_help_lists_every_command_with_one_line_and_examples():
     done = leg_fk('-h')
     assert (done.returncode, done.stderr) == (0, '')
     listed, _, examples = done.stdout.partition('examples:')
     for command, (_, purpose) in COMMANDS.items():
         assert f'\n    {command} ' in listed and purpose in ' '.join(listed.split())
-    assert '\n  leg_fk demo' in examples
+        assert f'\n  leg_fk {command}' in examples
 
 
 @pytest.mark.parametrize('command', COMMANDS)

@@ -37,10 +37,15 @@ Denavit-Hartenberg table. Lengths are metres, quaternions x y z w, poses in the 
 
 EXAMPLES = """\
 examples:
-  leg_fk demo
+  leg_fk list
   leg_fk pose left_leg --degrees 0 10 0 -30 -15 5
-  leg_fk compare my_robot.urdf
+  leg_fk explain left_leg
   leg_fk bag walking.mcap walking_with_poses.mcap
+  leg_fk plot walking.mcap -o feet.png
+  leg_fk table my_robot.urdf --root root_link --tips l_sole r_sole -o my_robot.yaml
+  leg_fk compare my_robot.urdf
+  leg_fk urdf left_leg right_leg -o legs.urdf
+  leg_fk demo
 
 `leg_fk COMMAND -h` explains a command and shows more examples."""
 
