@@ -25,8 +25,6 @@ def main() -> int:
     args = parser.parse_args()
     if unknown := set(args.parts) - PARTS.keys():
         parser.error(f'found part {", ".join(sorted(unknown))}, allowed: {", ".join(PARTS)}')
-    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
     report = Report()
     if (load := os.getloadavg()[0]) > _QUIET_LOAD:
         report.note(f'  this machine is busy (load {load:.1f}): expect wide spreads')

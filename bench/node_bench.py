@@ -20,7 +20,12 @@ from typing import Any, NamedTuple
 from bench.joint_messages import joint_positions, ROBOT_JOINTS
 from bench.report import cpu_ns, ratio, Report
 from geometry_msgs.msg import PoseStamped, TwistStamped
-from icub_leg_fk.tools.demo_replay import DemoError, lossless, running_node
+from icub_leg_fk.tools.demo_replay import (
+    DemoError,
+    lossless,
+    running_node,
+    stay_on_this_machine,
+)
 import rclpy
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
@@ -60,6 +65,7 @@ def measure_node(report: Report, quick: bool) -> None:
     """Add CPU and latency."""
     turns, count = (2, 50) if quick else (12, 1000)
     stretches: dict[str, list[_Stretch]] = {name: [] for name in _NODES}
+    stay_on_this_machine()
     with ExitStack() as stack:
         load = stack.enter_context(closing(_Load()))
         nodes = {name: _start(stack, load, f'/bench_{i}', *spec)
@@ -92,9 +98,9 @@ def _start(stack: ExitStack, load: _Load, namespace: str, program: tuple[str, ..
     if program == (_OURS,):
         parameters = parameters | lossless(namespace, FEET, _DEPTH)
     # In sessions of their own Linux would share out the cores among the nodes differently.
-    pid, check = stack.enter_context(
+    process, check = stack.enter_context(
         running_node(namespace, parameters, program, own_session=False))
-    node = _Node(namespace, pid, load.watch(namespace, 'publish_twist' in parameters))
+    node = _Node(namespace, process.pid, load.watch(namespace, 'publish_twist' in parameters))
     for _ in range(100):
         check()
         _, lost = load.send(node, 100.0, _TRIES, _SOON)

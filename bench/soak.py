@@ -5,7 +5,6 @@ the first minute (of a longer run), and its latency stays what it was.
 """
 
 import argparse
-import os
 import statistics
 import sys
 import time
@@ -13,7 +12,7 @@ import time
 from bench.report import cpu_ns, machine, resident_bytes
 from bench.soak_robot import DEPTH, FEET, SoakRobot
 from icub_leg_fk.errors import LegFKError
-from icub_leg_fk.tools.demo_replay import lossless, running_node
+from icub_leg_fk.tools.demo_replay import lossless, running_node, stay_on_this_machine
 
 NAMESPACE = '/soak'
 WINDOW = 10.0  # s
@@ -30,12 +29,13 @@ def main() -> int:
     args = parser.parse_args()
     if not args.minutes > 0:
         parser.error(f'found --minutes {args.minutes:g}, allowed: more than 0')
-    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
     try:
-        with running_node(NAMESPACE, lossless(NAMESPACE, FEET, DEPTH)) as (pid, check):
-            failures = _soak(pid, args.minutes)
+        stay_on_this_machine()
+        with running_node(NAMESPACE, lossless(NAMESPACE, FEET, DEPTH)) as (node, check):
+            failures = _soak(node.pid, args.minutes)
             check()
+        if node.returncode:
+            failures.append(f'exit code {node.returncode}')
     except LegFKError as error:
         failures = [str(error)]
     print(f'not endured: {"; ".join(failures)}' if failures else 'endured')

@@ -67,10 +67,10 @@ def lossless(namespace: str, tips: Iterable[str], depth: int) -> dict[str, str]:
 @contextmanager
 def running_node(namespace: str, parameters: Mapping[str, str],
                  program: Sequence[str] = ('icub_leg_fk.ros.main',), own_session: bool = True
-                 ) -> Iterator[tuple[int, Callable[[], None]]]:
+                 ) -> Iterator[tuple[subprocess.Popen[bytes], Callable[[], None]]]:
     """Run `foot_pose_publisher`, or another module, in a process of its own.
 
-    In a session of its own Ctrl-C does not reach it. Gives its process id, and what raises
+    In a session of its own Ctrl-C does not reach it. Gives the process, and what raises
     `DemoError` once it has stopped by itself.
     """
     words = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
@@ -81,7 +81,7 @@ def running_node(namespace: str, parameters: Mapping[str, str],
             with held_signals():  # the node must not get away between its start and the next line
                 process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log,
                                            stderr=log, start_new_session=own_session)
-            yield process.pid, partial(_check_runs, process, log)
+            yield process, partial(_check_runs, process, log)
         finally:
             with held_signals():
                 if process is not None:
