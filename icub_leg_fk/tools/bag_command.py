@@ -69,8 +69,6 @@ def run(args: argparse.Namespace) -> int:
     settings['progress'] = _show_share if shows_progress else None
     failed = False
     for (source, _), outcome in _outcomes(tasks, settings, min(args.jobs, len(tasks))):
-        if shows_progress:
-            print('\r\033[K', end='', file=sys.stderr, flush=True)
         if isinstance(outcome, Summary):
             print('\n'.join(_summary_lines(outcome)), flush=True)
             continue
@@ -90,10 +88,15 @@ def _outcomes(tasks: Sequence[tuple[Path, Path]], settings: Mapping[str, Any], j
     """Yield each task with what came of it, some worked on at a time."""
     if jobs == 1:
         for task in tasks:
+            outcome: Summary | Exception
             try:
-                yield task, add_foot_poses(*task, **settings)
+                outcome = add_foot_poses(*task, **settings)
             except LegFKError as error:
-                yield task, error
+                outcome = error
+            finally:
+                if settings['progress'] is not None:
+                    print('\r\033[K', end='', file=sys.stderr, flush=True)
+            yield task, outcome
         return
     pool = ProcessPoolExecutor(jobs, get_context('spawn'), _begin_worker)
     try:
