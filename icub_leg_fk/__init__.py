@@ -30,7 +30,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Import numpy only when it is needed: `leg_fk -h` and shell completion are not."""
+    """Import numpy only when it is needed, which it is not for `leg_fk -h`."""
     if name in _KINEMATICS:
         return getattr(import_module('icub_leg_fk.kinematics'), name)
     raise AttributeError(f'module {__name__!r} has no attribute {name!r}')

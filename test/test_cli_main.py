@@ -35,7 +35,7 @@ def test_version_is_the_packages():
     assert leg_fk('--version').stdout == f'leg_fk {icub_leg_fk.__version__}\n'
 
 
-@pytest.mark.parametrize('words', [['-h'], [], ['--version']])
+@pytest.mark.parametrize('words', [['-h'], [], ['pose', '-h'], ['--version']])
 def test_help_imports_nothing_heavy(words):
     program = ('import sys; from icub_leg_fk.tools.leg_fk import main; main(sys.argv[1:]); '
                "print(*sorted(sys.modules), sep='\\n', file=sys.stderr)")

@@ -1,10 +1,14 @@
 """`leg_fk list`: the chains and versions of a kinematics file."""
 
-import argparse
-from typing import Any
+from __future__ import annotations
 
-from icub_leg_fk.kinematics.catalog import ChainEntry
+import argparse
+from typing import Any, TYPE_CHECKING
+
 from icub_leg_fk.tools import options, text
+
+if TYPE_CHECKING:
+    from icub_leg_fk.kinematics.catalog import ChainEntry
 
 EXAMPLES = """\
 examples:

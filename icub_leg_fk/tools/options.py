@@ -1,13 +1,17 @@
 """What subcommands share: options by their names, and the chains and joint positions they mean."""
 
+from __future__ import annotations
+
 import argparse
 from collections.abc import Callable, Sequence
 import math
 import sys
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from icub_leg_fk.errors import JointVectorError, LegFKError
-from icub_leg_fk.kinematics import Catalog, Chain
+
+if TYPE_CHECKING:
+    from icub_leg_fk.kinematics import Catalog, Chain
 
 LEGS = ('left_leg', 'right_leg')
 DEFAULT_VERSION = 'v2_5'
@@ -49,12 +53,12 @@ def add(parser: argparse._ActionsContainer, *names: str) -> None:
 
 
 def _known_chains(parsed_args: argparse.Namespace, **_: object) -> list[str]:
-    return [*Catalog.load(parsed_args.kinematics_file).chains]
+    return [*load_catalog(parsed_args).chains]
 
 
 def _known_versions(parsed_args: argparse.Namespace, **_: object) -> list[str]:
-    chains = Catalog.load(parsed_args.kinematics_file).chains.values()
-    return [*dict.fromkeys(version for entry in chains for version in entry.versions)]
+    return [*dict.fromkeys(version for entry in load_catalog(parsed_args).chains.values()
+                           for version in entry.versions)]
 
 
 _COMPLETERS = {'chain': _known_chains, '--chains': _known_chains, '--version': _known_versions}
@@ -120,6 +124,8 @@ def chosen_version(catalog: Catalog, chain: str, version: str | None) -> str:
 
 def load_catalog(args: argparse.Namespace) -> Catalog:
     """Return the catalog that `-k` names; what it warns of is said on stderr."""
+    from icub_leg_fk.kinematics import Catalog
+
     catalog = Catalog.load(args.kinematics_file)
     for line in catalog.warnings:
         print(f'leg_fk: warning: {line}', file=sys.stderr)

@@ -1,10 +1,15 @@
 """`leg_fk pose`: the pose of a chain's tip for one joint vector."""
 
-import argparse
+from __future__ import annotations
 
-from icub_leg_fk.kinematics import Chain
-from icub_leg_fk.kinematics.rotation import Array
+import argparse
+from typing import TYPE_CHECKING
+
 from icub_leg_fk.tools import options, text
+
+if TYPE_CHECKING:
+    from icub_leg_fk.kinematics import Chain
+    from icub_leg_fk.kinematics.rotation import Array
 
 EXAMPLES = """\
 The joints stand in the order that `leg_fk list` shows. Lengths in the output are metres; the

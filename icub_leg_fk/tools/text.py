@@ -1,13 +1,17 @@
 """Numbers, tables and matrices as text that can be checked by eye."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Sequence
 import math
 import re
 import textwrap
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 from icub_leg_fk.errors import LegFKError
-from icub_leg_fk.kinematics import Chain, DHLink
+
+if TYPE_CHECKING:
+    from icub_leg_fk.kinematics import Chain, DHLink
 
 WIDTH = 98
 _UNLIKELY = 10.0  # m; of a joint's position, which may have been meant in mm
