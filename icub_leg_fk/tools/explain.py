@@ -132,8 +132,8 @@ def _blocks(e: Explanation) -> Iterator[Any]:
         yield ('equation', '', *step.factors)
         yield 'equation', '', step.A
     yield 'heading', 'Step 6. Multiply'
-    for i, step in enumerate(e.steps):
-        yield 'equation', f'T_0{i + 1} = {f"T_0{i} A_{i}" if i else "A_0"}', step.T_0
+    for i, T in enumerate(e.products):
+        yield 'equation', f'T_0{i + 1} = {f"T_0{i} A_{i}" if i else "A_0"}', T
     yield 'equation', 'T_Ro0', e.T_root_0
     for tip in e.tips:
         yield ('equation', *tip)
@@ -386,7 +386,7 @@ def _as_json(e: Explanation) -> dict[str, Any]:
             ('x', 'y', 'z', 'origin'))} for T in e.frames.values()],
         'frame_names': list(e.frames),
         'links': [_link(step, e.is_modified) for step in e.steps],
-        'running_products': [_matrix(step.T_0) for step in e.steps],
+        'running_products': [_matrix(T) for T in e.products],
         'T_root_0': _matrix(e.T_root_0),
         'after_last_link': {name: _matrix(T) for name, T in e.tips},
         'T_root_tip': _matrix(e.T_root_tip)}

@@ -9,7 +9,7 @@ added up while multiplying, and appear as c_34 and s_34, or c_3m4 and s_3m4 for 
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import reduce
 from importlib import import_module
@@ -33,7 +33,7 @@ _TIP_SYMBOLS = {'left_foot': ('Lf', 'Ls'), 'right_foot': ('Rf', 'Rs'), 'head_imu
 
 @dataclass(frozen=True)
 class Step:
-    """What row `index` contributes: its values, A_i with its four factors, and T_0(i+1)."""
+    """What row `index` contributes: its values, and A_i with its four factors."""
 
     index: int
     joint: str  # empty for a fixed row
@@ -44,7 +44,6 @@ class Step:
     alpha: Cell
     factors: tuple[Matrix, ...]
     A: Matrix
-    T_0: Matrix
 
 
 @dataclass(frozen=True)
@@ -57,6 +56,7 @@ class Explanation:
     q: Sequence[float] | None  # [rad or m]; None where the joints stay symbols
     T_root_0: Matrix
     steps: list[Step]
+    products: list[Matrix]  # T_01, T_02, ... T_0m
     tips: list[tuple[str, Matrix]]  # what follows the last row: T_nIs, and that of the sole
     T_root_tip: Matrix
     frames: dict[str, Array]  # by name, 0 to m and the tips', in the root frame, for q or q = 0
@@ -190,6 +190,7 @@ def work_out(version: ChainVersion, chain: Chain, foot_frame: str | None,
     """Work a chain out for a joint vector [rad or m], or for symbols, which are exact."""
     algebra, decimals = _Algebra(exact or q is None), _Algebra(False)
     steps = _steps(chain, q, algebra)
+    products = algebra.running_products(steps, chain.convention == 'modified')
     tip, sole = _TIP_SYMBOLS.get(chain.tip, ('E', 'S'))
     tips = []
     if not np.array_equal(version.T_n_tip, np.eye(4)):
@@ -206,9 +207,9 @@ def work_out(version: ChainVersion, chain: Chain, foot_frame: str | None,
         T = frames[name[3:]] = T @ np.array(_constant(placed, decimals))
     T_root_0 = _constant(chain.T_root_0, algebra)
     exact_tips = [(name, _constant(placed, algebra)) for name, placed in tips]
-    T_root_tip = product(T_root_0, steps[-1].T_0, *(placed for _, placed in exact_tips))
-    return Explanation(chain, tip, version.source, q, T_root_0, steps, exact_tips, T_root_tip,
-                       frames, algebra.symbols)
+    T_root_tip = product(T_root_0, products[-1], *(placed for _, placed in exact_tips))
+    return Explanation(chain, tip, version.source, q, T_root_0, steps, products, exact_tips,
+                       T_root_tip, frames, algebra.symbols)
 
 
 def product(*matrices: Matrix) -> Matrix:
@@ -240,7 +241,5 @@ def _steps(chain: Chain, q: Sequence[float] | None, algebra: _Algebra) -> list[S
             [[1, 0, 0, 0], [0, ca, -sa, 0], [0, sa, ca, 0], [0, 0, 0, 1]])
         if modified:
             factors = (factors[3], factors[2], factors[0], factors[1])
-        A = product(*factors)
-        steps.append(Step(i, joint, link, theta, d, a, alpha, factors, A, A))
-    products = algebra.running_products(steps, modified)
-    return [replace(step, T_0=T) for step, T in zip(steps, products, strict=True)]
+        steps.append(Step(i, joint, link, theta, d, a, alpha, factors, product(*factors)))
+    return steps
