@@ -84,36 +84,37 @@ def _show_share(share: float) -> None:
 
 
 def _outcomes(tasks: Sequence[tuple[Path, Path]], settings: Mapping[str, Any], jobs: int
-              ) -> Iterator[tuple[tuple[Path, Path], Summary | Exception]]:
+              ) -> Iterator[tuple[tuple[Path, Path], Summary | LegFKError]]:
     """Yield each task with what came of it, some worked on at a time."""
     if jobs == 1:
         for task in tasks:
-            outcome: Summary | Exception
-            try:
-                outcome = add_foot_poses(*task, **settings)
-            except LegFKError as error:
-                outcome = error
-            finally:
-                if settings['progress'] is not None:
-                    print('\r\033[K', end='', file=sys.stderr, flush=True)
-            yield task, outcome
+            yield task, _attempt(task, settings)
         return
     pool = ProcessPoolExecutor(jobs, get_context('spawn'), _begin_worker)
     try:
-        futures = {pool.submit(add_foot_poses, *task, **settings): task for task in tasks}
+        futures = {pool.submit(_attempt, task, settings): task for task in tasks}
         for future in as_completed(futures):
             try:
                 yield futures[future], future.result()
             except BrokenProcessPool:
                 yield futures[future], LegFKError('not done: a worker was killed')
-            except LegFKError as error:
-                yield futures[future], error
         pool.shutdown()
     except BaseException:
         for worker in active_children():
             worker.terminate()
         pool.shutdown(cancel_futures=True)
         raise
+
+
+def _attempt(task: tuple[Path, Path], settings: Mapping[str, Any]) -> Summary | LegFKError:
+    """Return what came of one bag; its progress is no more to be seen."""
+    try:
+        return add_foot_poses(*task, **settings)
+    except LegFKError as error:
+        return error
+    finally:
+        if settings['progress'] is not None:
+            print('\r\033[K', end='', file=sys.stderr, flush=True)
 
 
 def _begin_worker() -> None:

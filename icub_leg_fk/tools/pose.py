@@ -1,15 +1,8 @@
 """`leg_fk pose`: the pose of a chain's tip for one joint vector."""
 
-from __future__ import annotations
-
 import argparse
-from typing import TYPE_CHECKING
 
 from icub_leg_fk.tools import options, text
-
-if TYPE_CHECKING:
-    from icub_leg_fk.kinematics import Chain
-    from icub_leg_fk.kinematics.rotation import Array
 
 EXAMPLES = """\
 The joints stand in the order that `leg_fk list` shows. Lengths in the output are metres; the
@@ -39,12 +32,7 @@ def run(args: argparse.Namespace) -> int:
             'chain': chain.name, 'version': chain.version, 'root_frame': chain.root_frame,
             'tip_frame': chain.tip_frame, 'position': T[:3, 3].tolist(), 'quaternion': quaternion,
             'matrix': T.tolist()}))
-    else:
-        print('\n'.join(_as_text(chain, q, T, quaternion)))
-    return 0
-
-
-def _as_text(chain: Chain, q: list[float], T: Array, quaternion: list[float]) -> list[str]:
+        return 0
     outside = chain.out_of_range(q)
     joints = text.columns([
         [name, *text.position(link, value).split(),
@@ -52,11 +40,12 @@ def _as_text(chain: Chain, q: list[float], T: Array, quaternion: list[float]) ->
          '<- outside' if name in outside else '']
         for name, link, value in zip(chain.joint_names, chain.joints, q, strict=True)])
     x, y, z, *xyzw = (text.fixed(value, 7) for value in (*T[:3, 3].tolist(), *quaternion))
-    return [
-        f'{chain.name} {chain.version}: {chain.tip_frame} in {chain.root_frame}', '',
-        *text.indented(joints), '', 'matrix (translation in m)',
-        *text.indented(text.matrix([[text.fixed(value, 7) for value in row]
-                                    for row in T[:3].tolist()] + [['0', '0', '0', '1']], '  ')),
-        '', *text.columns([['position (m)', 'x', x, 'y', y, 'z', z]]),
-        *text.columns([['quaternion  ', *(word for pair in zip('xyzw', xyzw) for word in pair)]]),
-        *(line for note in text.range_notes(chain, q) for line in ('', *text.wrapped(note)))]
+    matrix = text.matrix([[text.fixed(value, 7) for value in row] for row in T[:3].tolist()]
+                         + [['0', '0', '0', '1']], '  ')
+    print(f'{chain.name} {chain.version}: {chain.tip_frame} in {chain.root_frame}', '',
+          *text.indented(joints), '', 'matrix (translation in m)', *text.indented(matrix), '',
+          *text.columns([['position (m)', 'x', x, 'y', y, 'z', z]]), *text.columns(
+              [['quaternion  ', *(word for pair in zip('xyzw', xyzw) for word in pair)]]),
+          *(line for note in text.range_notes(chain, q) for line in ('', *text.wrapped(note))),
+          sep='\n')
+    return 0
