@@ -78,11 +78,10 @@ def run(args: argparse.Namespace) -> int:
         return 1
     status = conclude(replay.answers, recording.times[:len(replay.sent)].tolist(), whole)
     if whole and all(answers.arrived for answers in replay.answers):
-        source = args.recording.name if args.recording else 'synthetic gait'
         tracks = [replace(recording.track(chain), received=answers.poses).where(
             np.isfinite(answers.latencies)) for chain, answers in zip(chains, replay.answers)]
         soles = {chain.name: catalog.chain(chain.name, args.version, 'sole') for chain in chains}
-        title = f'{source}   {args.version}'
+        title = f'{args.recording.name if args.recording else "synthetic gait"}   {args.version}'
         save_picture(lambda: feet_figure(tracks, default_instants(tracks), title, soles),
                      picture, force=force)
         print(f'picture       {picture}', flush=True)

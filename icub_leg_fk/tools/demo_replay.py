@@ -157,9 +157,8 @@ class Replay:
             check()
             now = time.monotonic()
             if now > deadline:
-                hint = '' if loopback_is_up() else f': {LOOPBACK_IS_DOWN}'
-                raise DemoError(f'the node was not found over DDS in {_DISCOVERY_TIMEOUT:g} s'
-                                f'{hint}')
+                raise DemoError(f'the node was not found over DDS in {_DISCOVERY_TIMEOUT:g} s' + (
+                    '' if loopback_is_up() else f': {LOOPBACK_IS_DOWN}'))
             self._publish(time.time_ns(), _PROBE)
             while time.monotonic() < now + _PROBE_PERIOD:
                 self._spin(0.02)

@@ -122,7 +122,7 @@ def feet_figure(tracks: Sequence[ChainTrack], instants: Sequence[float], title: 
     frames = ', '.join(dict.fromkeys(
         [tracks[0].chain.root_frame, *(track.chain.tip_frame for track in tracks)]))
     figure.text(0.03, 1 - 0.35 / height, title, fontsize=19, weight='bold', va='center')
-    for x, side, words in ((0.03, 'left', _notes(tracks)),
+    for x, side, words in ((0.03, 'left', _notes(tracks, bool(rows))),
                            (0.985, 'right', f'axes of {frames};  squares of {space.step:g} m')):
         figure.text(x, 1 - 0.8 / height, words, fontsize=10.5, ha=side, va='center', color=FAINT)
     return figure
@@ -261,8 +261,8 @@ def _draw_tips(panels: Sequence[Axes], tracks: Sequence[ChainTrack]) -> None:
                      borderpad=0, handlelength=1.2, columnspacing=1.2)
 
 
-def _notes(tracks: Sequence[ChainTrack]) -> str:
-    notes = [] if any(map(outside_ranges, tracks)) else ['all joints inside their ranges']
+def _notes(tracks: Sequence[ChainTrack], any_outside: bool) -> str:
+    notes = [] if any_outside else ['all joints inside their ranges']
     if found := gaps(tracks):
         notes.append(f'grey: no pose, {max(b - a for a, b in found):.2f} s at most')
     if any(len(track.times) > _MOST_SAMPLES for track in tracks):

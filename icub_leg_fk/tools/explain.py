@@ -26,7 +26,6 @@ examples:
   leg_fk explain head_imu --version v2 --degrees 0 0 0 30 0 45 --symbolic
   leg_fk explain arm -k cylindrical_arm.yaml --version v1 --latex > arm.tex"""
 
-
 _STANDARD = [
     ['cos theta_i', '-sin theta_i cos alpha_i', 'sin theta_i sin alpha_i', 'a_i cos theta_i'],
     ['sin theta_i', 'cos theta_i cos alpha_i', '-cos theta_i sin alpha_i', 'a_i sin theta_i'],
@@ -36,7 +35,8 @@ _CRAIGS = [
     ['sin theta_i cos alpha_i', 'cos theta_i cos alpha_i', '-sin alpha_i', '-d_i sin alpha_i'],
     ['sin theta_i sin alpha_i', 'cos theta_i sin alpha_i', 'cos alpha_i', 'd_i cos alpha_i'],
     ['0', '0', '0', '1']]
-_ENTRIES = [[f'r_{i}{j}' for j in '123'] + [f'p_{axis}'] for i, axis in zip('123', 'xyz')]
+_ENTRIES = [(f'r_{i + 1}{j + 1}' if j < 3 else f'p_{"xyz"[i]}', i, j)  # column by column
+            for j in range(4) for i in range(3)]
 _WIDE, _LINE = 330, 260  # characters of LaTeX: a matrix that fits on a line, a line of a sum
 _ESCAPES = {letter: f'\\{letter}' for letter in '_&%$#{}'} | {
     '\\': r'\textbackslash{}', '^': r'\^{}', '~': r'\~{}'}
@@ -100,8 +100,7 @@ def as_latex(e: Explanation) -> str:
             lines += [rf'\begin{{center}}\begin{{tabular}}{{{"l" * len(parts[1][0])}}}', *header,
                       *[r'\hline'] * len(header), *rows, r'\end{tabular}\end{center}']
         elif kind in ('title', 'heading'):
-            level = 'section' if kind == 'title' else 'subsection'
-            lines.append(rf'\{level}*{{{_mixed(parts[0])}}}')
+            lines.append(rf'\{"sub" * (kind == "heading")}section*{{{_mixed(parts[0])}}}')
         else:
             lines += ['', _mixed(parts[0])]
     return '\n'.join([*lines, r'\end{document}'])
@@ -277,8 +276,8 @@ def _text_equation(e: Explanation, name: str, *matrices: Matrix) -> list[str]:
     if max(map(len, lines)) <= text.WIDTH or len(matrices) > 1:
         return lines
     lines = [f'  {name} =']
-    for entry, cell in _entries(matrices[0]):
-        first, *rest = _filled(_with_value(e, cell), text.WIDTH - 11)
+    for entry, i, j in _ENTRIES:
+        first, *rest = _filled(_with_value(e, matrices[0][i][j]), text.WIDTH - 11)
         lines += [f'    {entry:4} = {first}', *(' ' * 11 + line for line in rest)]
     return lines
 
@@ -291,16 +290,10 @@ def _latex_equation(name: str, *matrices: Matrix) -> list[str]:
                  for rows in written]
         return [rf'\[ {_formula(name)} = {" ".join(parts)} \]']
     lines = [rf'\[ {_formula(name)}: \]', r'\begin{align*}']
-    for entry, cell in _entries(matrices[0]):
-        first, *rest = _filled(_terms(cell, _latex), _LINE)
+    for entry, i, j in _ENTRIES:
+        first, *rest = _filled(_terms(matrices[0][i][j], _latex), _LINE)
         lines += [rf'{_formula(entry)} &= {first} \\', *(rf'&\quad {line} \\' for line in rest)]
     return [*lines, r'\end{align*}']
-
-
-def _entries(T: Matrix) -> Iterator[tuple[str, Cell]]:
-    """Yield the names and entries of a transform, column by column."""
-    for names, cells in zip(zip(*_ENTRIES), zip(*T[:3])):
-        yield from zip(names, cells)
 
 
 def _terms(cell: Cell, printer: Callable[[Any], str] | None = None) -> list[str]:

@@ -2,8 +2,8 @@
 """The `leg_fk` command: one subcommand per module of this package.
 
 A subcommand's module has `EXAMPLES`, `add_arguments(parser)` and `run(args)`. Only that of the
-subcommand asked for is imported; what is optional it imports inside functions, and `list` and
-`pose`, which are asked for most, numpy too.
+subcommand asked for is imported; what is optional it imports inside functions, and `pose`, which
+is asked for most, numpy too.
 """
 
 import argparse

@@ -1,14 +1,10 @@
 """`leg_fk list`: the chains and versions of a kinematics file."""
 
-from __future__ import annotations
-
 import argparse
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
+from icub_leg_fk.kinematics.catalog import ChainEntry
 from icub_leg_fk.tools import options, text
-
-if TYPE_CHECKING:
-    from icub_leg_fk.kinematics.catalog import ChainEntry
 
 EXAMPLES = """\
 examples:

@@ -52,16 +52,12 @@ def add(parser: argparse._ActionsContainer, *names: str) -> None:
             setattr(action, 'completer', _COMPLETERS[name])  # noqa: B010 (it is argcomplete's)
 
 
-def _known_chains(parsed_args: argparse.Namespace, **_: object) -> list[str]:
-    return [*load_catalog(parsed_args).chains]
-
-
-def _known_versions(parsed_args: argparse.Namespace, **_: object) -> list[str]:
-    return [*dict.fromkeys(version for entry in load_catalog(parsed_args).chains.values()
-                           for version in entry.versions)]
-
-
-_COMPLETERS = {'chain': _known_chains, '--chains': _known_chains, '--version': _known_versions}
+_COMPLETERS: dict[str, Callable[..., list[str]]] = {
+    'chain': lambda parsed_args, **_: [*load_catalog(parsed_args).chains],
+    '--chains': lambda parsed_args, **_: [*load_catalog(parsed_args).chains],
+    '--version': lambda parsed_args, **_: [*dict.fromkeys(
+        version for entry in load_catalog(parsed_args).chains.values()
+        for version in entry.versions)]}
 
 
 def add_output(parser: argparse.ArgumentParser, purpose: str) -> None:
@@ -98,8 +94,8 @@ def number_between(low: float, high: float, allowed: str = '') -> Callable[[str]
     return parse
 
 
-_joint_position = number_between(
-    -LARGEST, LARGEST, f'finite numbers up to {LARGEST:g}, one per joint')
+_joint_position = number_between(-LARGEST, LARGEST, f'finite numbers up to {LARGEST:g}, one per '
+                                 'joint')
 
 
 def own_versions(args: argparse.Namespace, chains: Sequence[str]) -> dict[str, str]:
