@@ -36,7 +36,7 @@ test: $(VENV)/.test
 	$(PYTEST) --numprocesses=auto --maxprocesses=4 --dist=loadfile --durations=10 $(ARGS)
 
 lint: $(VENV)/.test
-	$(PYTEST) test/test_lint.py test/test_flake8.py test/test_pep257.py
+	$(PYTEST) test/packaging/test_lint.py test/packaging/test_flake8.py test/packaging/test_pep257.py
 
 docs: $(VENV)/.docs
 	$(PYTHON) -m sphinx -W --keep-going -q docs build/html
@@ -49,7 +49,7 @@ soak: $(VENV)/.ros
 	$(PYTHON) -m bench.soak --minutes $(MINUTES)
 
 readme: $(VENV)/.test
-	README_BLOCKS=1 $(PYTEST) test/test_readme.py -k every_block -rA $(ARGS)
+	README_BLOCKS=1 $(PYTEST) test/packaging/test_readme.py -k every_block -rA $(ARGS)
 
 # What the source distribution lacks, the tests in it miss.
 sdist: $(VENV)/.test

@@ -7,6 +7,8 @@ from setuptools import find_packages, setup
 
 PACKAGE = 'icub_leg_fk'
 SHARE = f'share/{PACKAGE}'
+# `colcon build --symlink-install` runs this file in a folder that has no README.
+README = Path(__file__).with_name('README.md')
 
 ROS, KILTED = ([f'ros-{release}-{name}' for name in (
     'common-interfaces', 'rclpy', 'rmw-fastrtps-cpp')] for release in ('jazzy', 'kilted'))
@@ -46,7 +48,7 @@ setup(
     name=PACKAGE,
     version='0.1.0',
     description='Forward kinematics of the iCub legs: joint angles in, foot poses out',
-    long_description=Path(__file__).with_name('README.md').read_text(encoding='utf-8'),
+    long_description=README.read_text(encoding='utf-8') if README.is_file() else '',
     long_description_content_type='text/markdown',
     url='https://icub-tech-iit.github.io/documentation/',
     classifiers=[
@@ -63,6 +65,8 @@ setup(
     maintainer='icub_leg_fk maintainers',
     maintainer_email='maintainers@users.noreply.github.com',
     license='Apache-2.0',
+    # A plain path for editable installs: found from anywhere, by type checkers too.
+    package_dir={'': '.'},
     packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*']),
     package_data={PACKAGE: ['py.typed']},
     data_files=[
@@ -85,8 +89,8 @@ setup(
     },
     entry_points={
         'console_scripts': [
-            'foot_pose_publisher = icub_leg_fk.ros.main:main',
-            'leg_fk = icub_leg_fk.tools.leg_fk:main',
+            'foot_pose_publisher = icub_leg_fk.node.main:main',
+            'leg_fk = icub_leg_fk.__main__:main',
         ],
     },
     zip_safe=False,

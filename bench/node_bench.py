@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 from bench.joint_messages import joint_positions, ROBOT_JOINTS
 from bench.report import cpu_ns, ratio, Report
 from geometry_msgs.msg import PoseStamped, TwistStamped
-from icub_leg_fk.tools.demo_replay import (
+from icub_leg_fk.tools.replay import (
     DemoError,
     lossless,
     running_node,
@@ -35,7 +35,7 @@ from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
 FEET = ('left_foot', 'right_foot')
-_OURS, _REFERENCES = 'icub_leg_fk.ros.main', 'bench.reference_nodes'
+_OURS, _REFERENCES = 'icub_leg_fk.node.main', 'bench.reference_nodes'
 _NODES: dict[str, tuple[tuple[str, ...], dict[str, str]]] = {  # program, and parameters
     'floor': ((_REFERENCES, 'floor'), {}), 'here': ((_OURS,), {}),
     'plain': ((_REFERENCES, 'plain'), {}),

@@ -12,7 +12,7 @@ import time
 from bench.report import cpu_ns, machine, resident_bytes
 from bench.soak_robot import DEPTH, FEET, SoakRobot
 from icub_leg_fk.errors import LegFKError
-from icub_leg_fk.tools.demo_replay import lossless, running_node, stay_on_this_machine
+from icub_leg_fk.tools.replay import lossless, running_node, stay_on_this_machine
 
 NAMESPACE = '/soak'
 WINDOW = 10.0  # s

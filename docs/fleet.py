@@ -7,7 +7,7 @@ from pathlib import Path
 import sys
 
 from dask.distributed import Client
-from icub_leg_fk.tools.bag import add_foot_poses
+from icub_leg_fk.tools.add_poses import add_foot_poses
 
 if __name__ == '__main__':
     recordings, output, *scheduler = sys.argv[1:]

@@ -14,7 +14,7 @@ from icub_leg_fk.kinematics.rotation import matrix_to_quaternion
 
 if TYPE_CHECKING:
     from icub_leg_fk.kinematics.table_from_urdf import chain_from_urdf
-    from icub_leg_fk.kinematics.urdf import Urdf
+    from icub_leg_fk.kinematics.urdf_file import Urdf
 
 __all__ = [
     'Catalog', 'Chain', 'DHLink', 'Urdf', 'chain_from_urdf', 'config_file', 'load_chain',
@@ -24,7 +24,7 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Import what reads URDFs only when it is needed."""
-    modules = {'chain_from_urdf': 'table_from_urdf', 'Urdf': 'urdf'}
+    modules = {'chain_from_urdf': 'table_from_urdf', 'Urdf': 'urdf_file'}
     if name in modules:
         return getattr(import_module(f'icub_leg_fk.kinematics.{modules[name]}'), name)
     raise AttributeError(f'module {__name__!r} has no attribute {name!r}')

@@ -20,7 +20,7 @@ from icub_leg_fk.errors import InputFileError
 from icub_leg_fk.kinematics.chain import Chain, CONVENTIONS
 from icub_leg_fk.kinematics.link import DHLink
 from icub_leg_fk.kinematics.rotation import Array
-from icub_leg_fk.kinematics.urdf import MOVING, Urdf
+from icub_leg_fk.kinematics.urdf_file import MOVING, Urdf
 import numpy as np
 
 PARALLEL = 1e-4  # rad; below it axes are taken as parallel

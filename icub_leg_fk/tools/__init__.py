@@ -1,1 +1,1 @@
-"""The `leg_fk` command: one module per subcommand, and what they share."""
+"""What the subcommands share: bags, recordings, drawing, the explanation, options and text."""

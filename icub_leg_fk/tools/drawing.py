@@ -16,7 +16,7 @@ from typing import Any, TYPE_CHECKING
 from icub_leg_fk.errors import LegFKError, MissingDependencyError, OutputFileError
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
-from icub_leg_fk.ros.configuration import SOLE_OUTLINE
+from icub_leg_fk.stream.configuration import SOLE_OUTLINE
 from icub_leg_fk.tools.output_file import check_target, whole_path
 from icub_leg_fk.tools.recording import ChainTrack, time_span
 import numpy as np

@@ -15,9 +15,9 @@ from typing import Any
 from icub_leg_fk.errors import InputFileError
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
-from icub_leg_fk.ros.configuration import DEFAULT_TIMEOUT
-from icub_leg_fk.ros.joint_input import JointInput
-from icub_leg_fk.tools import bag_reading
+from icub_leg_fk.stream.configuration import DEFAULT_TIMEOUT
+from icub_leg_fk.stream.joint_input import JointInput
+from icub_leg_fk.tools import bags
 from icub_leg_fk.tools.options import LARGEST, number
 from icub_leg_fk.tools.output_file import is_bag, whole_path
 import numpy as np
@@ -82,9 +82,9 @@ def read_bag(path: Path, chains: Sequence[Chain], topic: str | None
     positions = [array('d') for _ in chains]
     now = 0  # when the bag received the present message [ns], for one without a stamp
     joint_input = JointInput(chains, DEFAULT_TIMEOUT, lambda: now)
-    with bag_reading.open_bag(path) as reader:
-        connections = bag_reading.joint_connections(reader, path, topic)
-        for _, received, data in bag_reading.messages(reader, path, connections):
+    with bags.open_bag(path) as reader:
+        connections = bags.joint_connections(reader, path, topic)
+        for _, received, data in bags.messages(reader, path, connections):
             now = received
             for vector in joint_input.feed(data):
                 stamps[vector.chain].append(vector.sec * 1_000_000_000 + vector.nanosec)
@@ -171,12 +171,12 @@ def _rows(file: str, reader: Any, joints: Sequence[str]) -> Iterator[list[float]
 def write_joint_states(path: str | Path, sent: Iterable[tuple[int, bytes]], *, force: bool
                        ) -> None:
     """Write serialized JointStates, by stamp [ns], as a bag, whole or not at all."""
-    rosbag2, typesys = bag_reading.import_rosbags()
+    rosbag2, typesys = bags.import_rosbags()
     store = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
     with whole_path(path, force=force, may_replace=is_bag) as place, \
             rosbag2.Writer(place, version=rosbag2.Writer.VERSION_LATEST,
                            storage_plugin=rosbag2.StoragePlugin.MCAP) as writer:
-        topic = writer.add_connection(bag_reading.DEFAULT_TOPIC, bag_reading.JOINT_STATE,
+        topic = writer.add_connection(bags.DEFAULT_TOPIC, bags.JOINT_STATE,
                                       typestore=store)
         for stamp, data in sent:
             writer.write(topic, stamp, data)

@@ -1,0 +1,1 @@
+"""The subcommands of `leg_fk`, one per module, named after it."""

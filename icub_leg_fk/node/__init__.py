@@ -1,0 +1,1 @@
+"""The rclpy node `foot_pose_publisher`."""

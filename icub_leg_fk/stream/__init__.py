@@ -1,0 +1,1 @@
+"""Bytes in, bytes out: serialized joint states to serialized poses; free of rclpy."""

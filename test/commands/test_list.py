@@ -1,0 +1,57 @@
+"""`leg_fk list`."""
+
+import json
+from pathlib import Path
+
+from support.leg_fk_process import assert_one_line_complaint, leg_fk
+import pytest
+
+ARM = Path(__file__).parents[2] / 'config' / 'examples' / 'cylindrical_arm.yaml'
+
+
+def test_the_text_names_chains_versions_joints_and_tip_frames():
+    text = leg_fk('list').stdout
+    for chain in ('left_leg', 'right_leg', 'head_imu'):
+        assert f'\n{chain}\n' in text
+    for words in ('l_hip_pitch  l_hip_roll  l_hip_yaw  l_knee  l_ankle_pitch  l_ankle_roll',
+                  'dh: l_foot_dh_frame', 'sole: r_sole', 'dh: imu_frame', 'v2_5'):
+        assert words in text
+    assert text.count('v3  (iKin, versions from 3.0 on, in the root frame of iCubGenova09') == 2
+    assert max(map(len, text.splitlines()[1:])) <= 100
+
+
+def test_json_holds_the_same():
+    listed = json.loads(leg_fk('list', '--json').stdout)
+    assert set(listed) == {'file', 'chains'}
+    chains = {chain['name']: chain for chain in listed['chains']}
+    assert list(chains) == ['left_leg', 'right_leg', 'head_imu']
+    left = chains['left_leg']
+    assert set(left) == {'name', 'tip', 'root_frame', 'joints', 'tip_frames', 'versions'}
+    assert left['tip_frames'] == {'dh': 'l_foot_dh_frame', 'sole': 'l_sole'}
+    assert left['joints'][3] == 'l_knee' and len(left['joints']) == 6
+    assert [version['name'] for version in left['versions']] == ['v1', 'v2_5', 'v3']
+    assert [bool(version['source']) for version in left['versions']] == [False, False, True]
+
+
+def test_a_file_of_ones_own_is_listed():
+    for option in ('-k', '--kinematics-file'):
+        listed = json.loads(leg_fk('list', option, ARM, '--json').stdout)
+        assert listed['file'] == str(ARM)
+        (arm,) = listed['chains']
+        assert arm['versions'][0]['joint_types'] == ['revolute', 'prismatic', 'prismatic']
+
+
+@pytest.mark.parametrize(('old', 'new', 'complaint'), [
+    ('units:', 'unit:', 'unit'),
+    ('prismatic', 'sliding', "'sliding', allowed: revolute or prismatic"),
+    ('range: [0, 500]', 'range: [500, 0]', 'lower at most upper'),
+])
+def test_a_mistake_in_the_file_is_one_line(tmp_path, old, new, complaint):
+    file = tmp_path / 'arm.yaml'
+    file.write_text(ARM.read_text().replace(old, new))
+    assert_one_line_complaint(leg_fk('list', '-k', file), complaint)
+
+
+def test_a_file_that_is_not_there_is_one_line(tmp_path):
+    assert_one_line_complaint(leg_fk('list', '-k', tmp_path / 'none.yaml'), 'none.yaml')
+    assert_one_line_complaint(leg_fk('list', '-k', tmp_path), str(tmp_path))

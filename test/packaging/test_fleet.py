@@ -1,0 +1,29 @@
+"""The script of the documentation, on a real Dask cluster of two processes."""
+
+from pathlib import Path
+import subprocess
+import sys
+
+from support.bag_files import LEFT_POSE, poses_of, read_bag, walk, write_bag
+import pytest
+
+SCRIPT = Path(__file__).resolve().parents[2] / 'docs' / 'fleet.py'
+
+
+def test_a_fleet_of_recordings_is_a_map_over_one_function(tmp_path):
+    distributed = pytest.importorskip('dask.distributed', reason='needs dask.distributed')
+    for number in range(3):
+        write_bag(tmp_path / 'in' / f'walk{number}', joints=walk(20 + number))
+    (tmp_path / 'in' / 'broken').mkdir()
+    (tmp_path / 'in' / 'broken' / 'metadata.yaml').write_text('nothing')
+    (tmp_path / 'out').mkdir()
+    with distributed.LocalCluster(n_workers=2, processes=True, threads_per_worker=1,
+                                  dashboard_address=None) as cluster:
+        done = subprocess.run(
+            [sys.executable, SCRIPT, tmp_path / 'in', tmp_path / 'out', cluster.scheduler_address],
+            capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count('Summary(') == 3 and 'broken: cannot be read' in done.stdout
+    for number in range(3):
+        _, messages = read_bag(tmp_path / 'out' / f'walk{number}')
+        assert len(poses_of(messages, LEFT_POSE)) == 20 + number

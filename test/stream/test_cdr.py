@@ -1,0 +1,245 @@
+"""CDR: what rclpy and rosbags read and write, and nothing that is not there."""
+
+import math
+import struct
+import tracemalloc
+
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from icub_leg_fk.errors import MalformedMessageError
+from icub_leg_fk.stream.cdr import (
+    PoseStampedEncoder,
+    TFMessageEncoder,
+    TwistStampedEncoder,
+)
+from support.joint_model import Message
+from support.joint_trial import bits, decode_joint_state
+import pytest
+
+TEXT = st.text(max_size=30)  # every character but lone surrogates, NUL included
+DOUBLES = st.lists(st.floats(), max_size=6).map(tuple)
+MESSAGES = st.builds(
+    Message, st.integers(-2**31, 2**31 - 1), st.integers(0, 2**32 - 1),
+    st.lists(TEXT.filter(lambda text: '\x00' not in text), max_size=6).map(tuple),
+    DOUBLES, DOUBLES, DOUBLES, TEXT.filter(lambda text: '\x00' not in text),
+    st.sampled_from('<>'), st.sampled_from((0, 1, 4, 9)), st.sampled_from((0, 1, 255)))
+LARGE = Message(7, 8, tuple(f'joint_{i}' for i in range(5000)), tuple(map(float, range(5000))),
+                tuple(map(float, range(4999))), (math.nan,) * 3)
+GOOD = Message(1, 2, ('a', '', 'längs'), (1.0, 2.0, 3.0), (4.0,), (5.0, 6.0), 'base')
+
+
+def fields(data):
+    """Return what was decoded, with floats as bytes, or None if it was refused."""
+    try:
+        message = decode_joint_state(data)
+    except MalformedMessageError:
+        return None
+    return (message.sec, message.nanosec, message.names, bits(message.positions),
+            bits(message.velocities))
+
+
+def meant(message):
+    return (message.sec, message.nanosec, message.names, bits(message.positions),
+            bits(message.velocities))
+
+
+def fields_of(ros):
+    """Return the same of a message object of rclpy or rosbags."""
+    return (ros.header.stamp.sec, ros.header.stamp.nanosec, tuple(ros.name), bits(ros.position),
+            bits(ros.velocity))
+
+
+@pytest.fixture(scope='module')
+def rclpy_reads():
+    """Return what reads bytes as rclpy does; None if it refuses them."""
+    serialization = pytest.importorskip('rclpy.serialization', reason='needs rclpy')
+    joint_state = pytest.importorskip('sensor_msgs.msg', reason='needs sensor_msgs').JointState
+
+    def read(data):
+        try:
+            return fields_of(serialization.deserialize_message(data, joint_state))
+        except Exception as error:  # noqa: BLE001 (RMWError is no public name)
+            assert 'failed to deserialize' in str(error)
+            return None
+    return read
+
+
+@settings(max_examples=300)
+@given(MESSAGES)
+@example(LARGE)
+def test_reads_what_rclpy_reads(rclpy_reads, message):
+    data = message.cdr()
+    assert fields(data) == rclpy_reads(data) == meant(message)
+
+
+@settings(max_examples=300)
+@given(MESSAGES, TEXT)
+@example(LARGE, '')
+def test_reads_what_rclpy_writes(message, frame_id):
+    serialization = pytest.importorskip('rclpy.serialization', reason='needs rclpy')
+    joint_state = pytest.importorskip('sensor_msgs.msg', reason='needs sensor_msgs').JointState
+    ros = joint_state(name=message.names, position=message.positions,
+                      velocity=message.velocities, effort=message.efforts)
+    ros.header.stamp.sec, ros.header.stamp.nanosec = message.sec, message.nanosec
+    ros.header.frame_id = frame_id  # cut by rclpy at a NUL
+    assert fields(serialization.serialize_message(ros)) == meant(message)
+
+
+@pytest.mark.parametrize('order', '<>')
+def test_refuses_a_message_cut_at_any_byte(order):
+    data = Message(**{**vars(GOOD), 'order': order}).cdr()
+    for end in range(len(data)):
+        with pytest.raises(MalformedMessageError):
+            decode_joint_state(data[:end])
+
+
+def test_refuses_the_other_byte_order_than_it_says():
+    for order, lie in (('<', b'\x00\x00'), ('>', b'\x00\x01')):
+        data = Message(**{**vars(GOOD), 'order': order}).cdr()
+        with pytest.raises(MalformedMessageError):
+            decode_joint_state(lie + data[2:])
+
+
+@pytest.mark.parametrize('kind', [2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 0x100, 0x101, 0xffff])
+def test_refuses_every_encapsulation_but_plain_cdr(kind):
+    with pytest.raises(MalformedMessageError, match=f'encapsulation 0x{kind:04x}; allowed'):
+        decode_joint_state(struct.pack('>H', kind) + GOOD.cdr()[2:])
+
+
+@pytest.mark.parametrize(('old', 'new'), [
+    (b'base\x00', b'base!'), (b'base\x00', b'b\x00se\x00'), (b'base\x00', b'bas\x00\x00')])
+def test_refuses_a_string_without_nul_at_its_end_or_with_one_before(old, new):
+    data = GOOD.cdr()
+    assert old in data
+    with pytest.raises(MalformedMessageError, match=r'header\.frame_id is not a string'):
+        decode_joint_state(data.replace(old, new))
+
+
+def test_reads_a_string_of_no_bytes_as_empty(rclpy_reads):
+    data = Message(1, 2, (), (0.5,)).cdr()
+    # Length 0 instead of length 1, NUL and padding; now it is the position that needs padding.
+    data = data[:12] + bytes(4) + data[20:28] + bytes(4) + data[28:]
+    assert fields(data) == rclpy_reads(data) is not None
+
+
+def test_reads_names_that_are_no_utf_8_as_rclpy_does(rclpy_reads):
+    data = GOOD.cdr().replace('längs'.encode(), b'l\xff\xfengs'[:6].ljust(6, b'\xc3'))
+    assert fields(data) == rclpy_reads(data)
+    assert '\ufffd' in fields(data)[2][2]
+
+
+@pytest.mark.parametrize('count', [2**32 - 1, 2**31, 2**31 - 1, 2**29, 2**28, 2**20])
+@pytest.mark.parametrize('order', '<>')
+def test_an_absurd_count_is_refused_without_allocating(order, count):
+    message = Message(**{**vars(GOOD), 'order': order})
+    data = message.cdr()
+    positions_at = data.index(struct.pack(f'{order}3d', *GOOD.positions))
+    counts_at = {'header.frame_id': 12, 'name': 24, 'velocity': positions_at + 24,
+                 'position': data.rindex(struct.pack(order + 'I', 3), 0, positions_at),
+                 'effort': positions_at + 40}
+    for field, at in counts_at.items():
+        spoilt = data[:at] + struct.pack(order + 'I', count) + data[at + 4:]
+        tracemalloc.start()
+        with pytest.raises(MalformedMessageError, match=f'{field} has {count} items'):
+            decode_joint_state(spoilt)
+        _, peak = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        assert peak < 20_000
+
+
+SOUND = [GOOD.cdr(), Message(**{**vars(GOOD), 'order': '>'}).cdr(),
+         Message(3, 4, ('lift', 'turn'), (0.1, 0.2)).cdr()]
+LONGEST = max(map(len, SOUND))
+SPOILS = st.lists(st.tuples(st.integers(0, LONGEST), st.one_of(
+    st.sampled_from((0, 1, 2, 4, 8, 0xff)), st.integers(0, 255))), max_size=3)
+
+
+@settings(max_examples=2000)
+@given(st.sampled_from(SOUND), SPOILS, st.one_of(st.none(), st.integers(0, LONGEST)))
+def test_spoilt_bytes_are_read_as_rclpy_reads_them_or_refused(rclpy_reads, sound, spoils, end):
+    """Whatever passes here passes there, with the same content; what does not is on the list.
+
+    But for the options in the encapsulation, which Kilted's Fast CDR looks at.
+    """
+    spoilt = bytearray(sound)
+    for at, byte in spoils:
+        spoilt[at % len(spoilt)] = byte
+    spoilt[2:4] = b'\x00\x00'
+    data = bytes(spoilt[:end])
+    ours, theirs = fields(data), rclpy_reads(data)
+    if ours is None and theirs is not None:
+        with pytest.raises(MalformedMessageError,
+                           match=r'the encapsulation|is not a string that ends'):
+            decode_joint_state(data)
+    else:
+        assert ours == theirs
+
+
+STAMPS = st.tuples(st.integers(-2**31, 2**31 - 1), st.integers(0, 2**32 - 1))
+FRAME_IDS = st.one_of(st.sampled_from(('', 'root_link', 'Fußgelenk/\U0001f9be', 'x' * 5000)),
+                      TEXT.filter(lambda text: '\x00' not in text))
+POSES = st.tuples(*[st.floats()] * 7)
+
+
+@pytest.fixture(scope='module')
+def rosbags_reads():
+    """Return what reads bytes as rosbags does, which asserts that no byte is left."""
+    typesys = pytest.importorskip('rosbags.typesys', reason='needs rosbags')
+    store = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
+
+    def read(data, kind):
+        message = store.deserialize_cdr(data, kind)
+        assert data == store.serialize_cdr(message, kind)
+        return message
+    return read
+
+
+def numbers_of(pose):
+    """Return the numbers of a Pose, a Transform or a Twist."""
+    parts = [getattr(pose, name) for name in ('position', 'translation', 'linear', 'orientation',
+                                              'rotation', 'angular') if hasattr(pose, name)]
+    return bits([getattr(part, axis) for part in parts for axis in 'xyzw' if hasattr(part, axis)])
+
+
+@given(FRAME_IDS, STAMPS, POSES)
+def test_rosbags_reads_the_pose_that_was_meant(rosbags_reads, frame_id, stamp, pose):
+    data = PoseStampedEncoder(frame_id).encode(*stamp, pose)
+    message = rosbags_reads(data, 'geometry_msgs/msg/PoseStamped')
+    assert message.header.frame_id == frame_id
+    assert (message.header.stamp.sec, message.header.stamp.nanosec) == stamp
+    assert numbers_of(message.pose) == bits(pose)
+
+
+@given(FRAME_IDS, STAMPS, st.tuples(*[st.floats()] * 6))
+def test_rosbags_reads_the_twist_that_was_meant(rosbags_reads, frame_id, stamp, twist):
+    data = TwistStampedEncoder(frame_id).encode(*stamp, twist)
+    message = rosbags_reads(data, 'geometry_msgs/msg/TwistStamped')
+    assert message.header.frame_id == frame_id
+    assert (message.header.stamp.sec, message.header.stamp.nanosec) == stamp
+    assert numbers_of(message.twist) == bits(twist)
+
+
+@given(st.lists(st.tuples(FRAME_IDS, FRAME_IDS, POSES), max_size=4), STAMPS)
+def test_rosbags_reads_the_transforms_that_were_meant(rosbags_reads, transforms, stamp):
+    encoder = TFMessageEncoder([(parent, child) for parent, child, _ in transforms])
+    data = encoder.encode(*stamp, [pose for _, _, pose in transforms])
+    message = rosbags_reads(data, 'tf2_msgs/msg/TFMessage')
+    assert [(t.header.frame_id, t.child_frame_id, numbers_of(t.transform))
+            for t in message.transforms] == [
+                (parent, child, bits(pose)) for parent, child, pose in transforms]
+    assert {(t.header.stamp.sec, t.header.stamp.nanosec) for t in message.transforms} <= {stamp}
+
+
+@given(FRAME_IDS, STAMPS, POSES)
+def test_a_pose_is_the_bytes_that_rclpy_writes(frame_id, stamp, pose):
+    serialize = pytest.importorskip('rclpy.serialization', reason='needs rclpy').serialize_message
+    messages = pytest.importorskip('geometry_msgs.msg', reason='needs geometry_msgs')
+    message = messages.PoseStamped()
+    message.header.frame_id = frame_id
+    message.header.stamp.sec, message.header.stamp.nanosec = stamp
+    at, turn = message.pose.position, message.pose.orientation
+    at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w = pose
+    ours, theirs = PoseStampedEncoder(frame_id).encode(*stamp, pose), serialize(message)
+    # Between the frame id and the numbers, and behind them, rclpy's buffer may hold anything.
+    end = 4 + 8 + 4 + len(frame_id.encode()) + 1
+    assert (ours[:end], ours[-56:]) == (theirs[:end], theirs[len(ours) - 56:len(ours)])
