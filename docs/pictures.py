@@ -13,7 +13,6 @@ VERSION = 'v2_5'
 LEGS = ('left_leg', 'right_leg')
 STANDING = np.radians([8.0, 0.0, 0.0, -16.0, -8.0, 0.0])
 CATALOG = Catalog.load()
-SOLES = {name: CATALOG.chain(name, VERSION, 'sole') for name in LEGS}
 
 
 def walking():
@@ -35,13 +34,13 @@ def frames():
     grid = figure.add_gridspec(2, 2, left=0.0, right=1.0, top=0.94, bottom=0.0, hspace=0.0)
     space = Space(figure, grid[:, 0], points, azimuth=222.0, zoom=1.1)
     for chain in chains[::-1]:
-        space.chain(chain, STANDING, SOLES[chain.name], 10)
+        space.chain(chain, STANDING, 10)
     space.frame(np.eye(4), 0.13, 60, 2.6, ('x backward', 'y right', 'z up'), 12)
     for place, foot_frame, names in (
             (grid[0, 1], 'dh', ('x up', 'y right', 'z toward the toes')),
             (grid[1, 1], 'sole', ('x forward', 'y left', 'z up'))):
         top = 0.94 if foot_frame == 'dh' else 0.46
-        tips = [CATALOG.chain(name, VERSION, foot_frame).tip_frame for name in LEGS]
+        tips = [CATALOG.chain(name, VERSION, foot_frame).frame_id for name in LEGS]
         figure.text(0.51, top, ',  '.join(tips), fontsize=15, weight='bold')
         default = ', the default' * (foot_frame == 'dh')
         figure.text(0.51, top - 0.045, f'foot_frame: {foot_frame}{default}', color=FAINT)

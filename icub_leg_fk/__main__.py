@@ -18,7 +18,7 @@ import sys
 from typing import Any, NoReturn
 
 from icub_leg_fk import __version__
-from icub_leg_fk.errors import LegFKError, near, UnknownNameError
+from icub_leg_fk.errors import closest, LegFKError, UnknownNameError
 from icub_leg_fk.tools.signals import stop_on_signals
 
 COMMANDS = {  # and what they are for
@@ -78,7 +78,7 @@ class Parser(argparse.ArgumentParser):
             if (not word.startswith('-') or word == '-' or _NEGATIVE.match(word) or option in known
                     or (word[:2] in known and not word.startswith('--'))):
                 continue
-            guess = near(option, known) or next((name for name in known if name[:2] == '--'
+            guess = closest(option, known) or next((name for name in known if name[:2] == '--'
                                                  and len(option) > 3 and option[2:] in name), '')
             self.error(f'unknown option {option}{f"; did you mean {guess}?" if guess else ""}')
 

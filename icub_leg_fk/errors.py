@@ -1,36 +1,14 @@
-"""Errors of icub_leg_fk: each carries its data and says what would have been allowed."""
+"""Errors of icub_leg_fk: each is named after its fault, carries its data and reads as a sentence."""
 
 from collections.abc import Iterable
+from difflib import get_close_matches
 import reprlib
 
-_LONG_NAME = 10  # characters; from here on a second slip is still a near miss
 
-
-def near(name: str, choices: Iterable[str]) -> str | None:
-    """Return the choice that a name is a misspelling of; None if there is none.
-
-    Near is one slip (a character too many, too few or another, or two that have changed places),
-    two from ten characters on.
-    """
-    slips = 2 if len(name) >= _LONG_NAME else 1
-    distances = {choice: _edit_distance(name, choice) for choice in choices
-                 if choice != name and abs(len(choice) - len(name)) <= slips}
-    close = [choice for choice, distance in distances.items()
-             if distance <= slips and distance < len(name)]
-    return min(close, key=distances.__getitem__, default=None)
-
-
-def _edit_distance(a: str, b: str) -> int:
-    """Return the distance of Damerau and Levenshtein, in its restricted form."""
-    rows = [list(range(len(b) + 1))]
-    for i, x in enumerate(a, 1):
-        rows.append([i])
-        for j, y in enumerate(b, 1):
-            least = min(rows[i - 1][j] + 1, rows[i][j - 1] + 1, rows[i - 1][j - 1] + (x != y))
-            if i > 1 and j > 1 and (x, a[i - 2]) == (b[j - 2], y):
-                least = min(least, rows[i - 2][j - 2] + 1)
-            rows[i].append(least)
-    return rows[-1][-1]
+def closest(name: str, choices: Iterable[str]) -> str | None:
+    """Return the choice that a name is most likely a misspelling of; None if there is none."""
+    likely = get_close_matches(name, list(choices), n=1, cutoff=0.7)
+    return likely[0] if likely else None
 
 
 class LegFKError(Exception):
@@ -44,58 +22,173 @@ class UnknownNameError(LegFKError):
         kind: what the name was meant for, such as `chain` or `version of chain left_leg`.
         name: the name that was given.
         choices: the names that exist.
+        advice: what else may help; empty if nothing.
     """
 
-    def __init__(self, kind: str, name: str, choices: Iterable[str]) -> None:
+    def __init__(self, kind: str, name: str, choices: Iterable[str], advice: str = '') -> None:
         self.kind = kind
         self.name = name
         self.choices = tuple(choices)
-        known = ', '.join(self.choices) or 'none'
-        guess = near(name, self.choices) if isinstance(name, str) else None
+        self.advice = advice
+        super().__init__(kind, name, self.choices, advice)
+
+    def __str__(self) -> str:
+        guess = closest(self.name, self.choices) if isinstance(self.name, str) else None
         hint = f'did you mean {guess!r}? ' if guess else ''
-        super().__init__(f'unknown {kind} {reprlib.repr(name)}; {hint}known: {known}')
+        known = ', '.join(self.choices) or 'none'
+        advice = f'; {self.advice}' if self.advice else ''
+        return f'unknown {self.kind} {reprlib.repr(self.name)}; {hint}known: {known}{advice}'
+
+
+class VersionNeededError(LegFKError):
+    """A chain with several versions and no default was asked for without one.
+
+    Attributes:
+        chain: name of the chain.
+        versions: the versions that it has.
+    """
+
+    def __init__(self, chain: str, versions: Iterable[str]) -> None:
+        self.chain = chain
+        self.versions = tuple(versions)
+        super().__init__(chain, self.versions)
+
+    def __str__(self) -> str:
+        return (f'chain {self.chain} has several versions and no default; give one of '
+                f'{", ".join(self.versions)}')
 
 
 class JointVectorError(LegFKError):
-    """A joint vector of the wrong length or with an entry that is no finite number."""
+    """Joint positions or velocities that cannot be computed with.
+
+    Attributes:
+        quantity: what is wrong, such as `q[2]` or `joint vector`.
+        fault: what is wrong with it, such as `is nan`.
+        allowed: what may stand there.
+    """
+
+    def __init__(self, quantity: str, fault: str, allowed: str) -> None:
+        self.quantity = quantity
+        self.fault = fault
+        self.allowed = allowed
+        super().__init__(quantity, fault, allowed)
+
+    def __str__(self) -> str:
+        return f'{self.quantity} {self.fault}; allowed: {self.allowed}'
 
 
-class CatalogError(LegFKError):
+class InputFileError(LegFKError):
+    """A file that cannot be read or does not hold what is needed.
+
+    Attributes:
+        file: path of the file as it was given.
+        fault: what is wrong with it.
+    """
+
+    def __init__(self, file: str, fault: str = '') -> None:
+        self.file = file
+        self.fault = fault
+        super().__init__(file, fault)
+
+    def __str__(self) -> str:
+        return f'{self.file}: {self.fault}' if self.fault else self.file
+
+
+class CatalogError(InputFileError):
     """A mistake in a kinematics file.
 
     Attributes:
         file: path of the file as it was given.
         line: line number, from 1; 0 if the whole file is meant.
-        where: chain, version, row and field, as far as they are known.
+        where: chain, version, row and field, as far as they are known; empty if the file
+            cannot be read.
         found: what stands there.
         allowed: what may stand there.
     """
 
     def __init__(self, file: str, line: int, where: str, found: str, allowed: str) -> None:
-        self.file = file
+        fault = f'{where}: found {found}, allowed: {allowed}' if where else found
+        super().__init__(file, fault)
         self.line = line
         self.where = where
         self.found = found
         self.allowed = allowed
-        place = f'{file}:{line}' if line else file
-        super().__init__(f'{place}: {where}: found {found}, allowed: {allowed}')
+        self.args = (file, line, where, found, allowed)
 
-
-class MalformedMessageError(LegFKError):
-    """Bytes that are not a well-formed CDR message of the expected type."""
-
-
-class ParameterError(LegFKError):
-    """A node parameter with a value that cannot be used."""
-
-
-class InputFileError(LegFKError):
-    """A file given to a tool that cannot be read or does not hold what the tool needs."""
+    def __str__(self) -> str:
+        if not self.where:
+            return f'cannot read {self.file}: {self.found}'
+        place = f'{self.file}:{self.line}' if self.line else self.file
+        return f'{place}: {self.fault}'
 
 
 class OutputFileError(LegFKError):
-    """A file that a tool is to write and cannot, or must not, such as one that already exists."""
+    """A file that is to be written and cannot, or must not, such as one that already exists.
+
+    Attributes:
+        file: path of the file as it was given.
+        fault: what is wrong with it.
+    """
+
+    def __init__(self, file: str, fault: str = '') -> None:
+        self.file = file
+        self.fault = fault
+        super().__init__(file, fault)
+
+    def __str__(self) -> str:
+        return f'{self.file}: {self.fault}' if self.fault else self.file
+
+
+class MalformedMessageError(LegFKError):
+    """Bytes that are not a well-formed CDR message of the expected type.
+
+    Attributes:
+        message: the type of the message, such as `JointState`.
+        fault: what is wrong with it, and where.
+    """
+
+    def __init__(self, message: str, fault: str) -> None:
+        self.message = message
+        self.fault = fault
+        super().__init__(message, fault)
+
+    def __str__(self) -> str:
+        return f'{self.message}: {self.fault}'
+
+
+class ParameterError(LegFKError):
+    """A parameter of the node that cannot be used.
+
+    Attributes:
+        parameter: name of the parameter.
+        fault: what is wrong with it, and what is allowed.
+    """
+
+    def __init__(self, parameter: str, fault: str = '') -> None:
+        self.parameter = parameter
+        self.fault = fault
+        super().__init__(parameter, fault)
+
+    def __str__(self) -> str:
+        return f'parameter {self.parameter}: {self.fault}' if self.fault else self.parameter
 
 
 class MissingDependencyError(LegFKError):
-    """An optional library that one tool needs is not installed."""
+    """An optional library that a command needs is not installed.
+
+    Attributes:
+        library: name of the library.
+        purpose: what needs it.
+        install: the line that installs it.
+    """
+
+    def __init__(self, library: str, purpose: str = '', install: str = '') -> None:
+        self.library = library
+        self.purpose = purpose
+        self.install = install
+        super().__init__(library, purpose, install)
+
+    def __str__(self) -> str:
+        if not self.purpose:
+            return self.library
+        return f'{self.purpose} needs {self.library}, which is not installed: {self.install}'

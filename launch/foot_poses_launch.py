@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 import re
 
-from icub_leg_fk.errors import near
+from icub_leg_fk.errors import closest
 from icub_leg_fk.kinematics import config_file
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
@@ -96,7 +96,7 @@ def refuse_misspelt(context: LaunchContext) -> None:
     """Refuse an argument whose name is nearly one of ours, which launch would pass over."""
     ours = (*PARAMETERS, *OTHERS)
     for name in context.launch_configurations:
-        if name not in ours and (guess := near(name, ours)):
+        if name not in ours and (guess := closest(name, ours)):
             raise RuntimeError(f'unknown argument {name!r}; did you mean {guess!r}?')
 
 

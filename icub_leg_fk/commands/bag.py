@@ -13,6 +13,7 @@ import sys
 from typing import Any
 
 from icub_leg_fk.errors import LegFKError, OutputFileError
+from icub_leg_fk.stream.configuration import DEFAULT_FRAME, DEFAULT_TIMEOUT, LEGS
 from icub_leg_fk.tools import options
 from icub_leg_fk.tools.add_poses import add_foot_poses, STORAGES, Summary
 from icub_leg_fk.tools.text import columns, indented
@@ -40,14 +41,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--out-dir', metavar='DIR', help='where each gets one of the same name')
     parser.add_argument('--jobs', metavar='N', type=_positive_integer, default=1,
                         help='bags to work on at a time (default: 1)')
-    options.add(parser, '--chains', '--version', '--chain-version', '--foot-frame',
-                '--joint-topic', '--kinematics-file', '--force')
-    parser.set_defaults(chains=options.LEGS, version=options.DEFAULT_VERSION, foot_frame='dh')
+    options.add(parser, '--chains', '--version', '--foot-frame', '--joint-topic', '--kinematics-file', '--force')
+    parser.set_defaults(chains=LEGS, version='', foot_frame=DEFAULT_FRAME)
     parser.add_argument('--frame-prefix', metavar='PREFIX', default='',
                         help='put before every frame id')
-    parser.add_argument('--joint-timeout', metavar='S', type=float, default=0.5,
+    parser.add_argument('--joint-timeout', metavar='S', type=float, default=DEFAULT_TIMEOUT,
                         help='age of a joint beside the newest of its chain above which there is '
-                             'no pose; 0 turns this off (default: 0.5)')
+                             f'no pose; 0 turns this off (default: {DEFAULT_TIMEOUT})')
     parser.add_argument('--storage', metavar='{mcap,sqlite3}', choices=('mcap', 'sqlite3'),
                         default='',
                         help='storage of the new bag (default: as OUT says, or as in the old one)')
@@ -64,7 +64,6 @@ def run(args: argparse.Namespace) -> int:
     tasks = _tasks(args)
     settings = {name: value for name, value in vars(args).items()
                 if name in signature(add_foot_poses).parameters}
-    settings['chain_versions'] = options.own_versions(args, args.chains)
     shows_progress = len(tasks) == 1 and sys.stderr is not None and sys.stderr.isatty()
     settings['progress'] = _show_share if shows_progress else None
     failed = False

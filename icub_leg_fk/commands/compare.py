@@ -92,22 +92,22 @@ def difference(chain: Chain, urdf: Urdf) -> Difference:
     """Return how far a chain's tip is from the robot's frame of that name."""
     Q = np.random.default_rng(2955).uniform(-_REACH, _REACH, (_SAMPLES, chain.n))
     ours = chain.forward(Q)
-    robot = urdf.forward(chain.root_frame, chain.tip_frame,
+    robot = urdf.forward(chain.root_frame, chain.frame_id,
                          dict(zip(chain.joint_names, Q.T, strict=True)))
     turn, words = _turn_of_axes(ours, robot)
     turned = ours @ turn
     fitted = _fitted(turned, robot) if chain.n >= _FEWEST_JOINTS else None
     mm, deg = _distance(turned, robot)
-    return Difference(chain.name, chain.version, chain.root_frame, chain.tip_frame, mm, deg, words,
+    return Difference(chain.name, chain.version, chain.root_frame, chain.frame_id, mm, deg, words,
                       *(_distance(fitted, robot) if fitted is not None else (None, None)))
 
 
 def _has(urdf: Urdf, chain: Chain) -> bool:
     """Return whether a robot has all joints of a chain between its root and tip frames."""
-    if not {chain.root_frame, chain.tip_frame} <= {*urdf.links}:
+    if not {chain.root_frame, chain.frame_id} <= {*urdf.links}:
         return False
     try:
-        path = urdf.path(chain.root_frame, chain.tip_frame)
+        path = urdf.path(chain.root_frame, chain.frame_id)
     except InputFileError:
         return False
     return {*chain.joint_names} <= {joint.name for joint in path}

@@ -12,6 +12,7 @@ import shutil
 import sys
 
 from icub_leg_fk.kinematics import Catalog, Chain, config_file
+from icub_leg_fk.stream.configuration import DEFAULT_FRAME, LEGS
 from icub_leg_fk.tools import options, replay as replays
 from icub_leg_fk.tools import recording as recordings
 from icub_leg_fk.tools.bags import import_rosbags
@@ -50,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add(parser, '--version', '--foot-frame')
     options.add_output(parser, 'picture to write, .png, .svg or .pdf (default: demo.png, which is '
                        'replaced)')
-    parser.set_defaults(version=options.DEFAULT_VERSION, foot_frame='dh')
+    parser.set_defaults(version='', foot_frame=DEFAULT_FRAME)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -61,14 +62,15 @@ def run(args: argparse.Namespace) -> int:
         import_rosbags()
         check_target(args.save, force=args.force, may_replace=is_bag)
     catalog = Catalog.load()
-    chains = [catalog.chain(name, args.version, args.foot_frame) for name in options.LEGS]
+    chains = [catalog.chain(name, args.version, args.foot_frame) for name in LEGS]
+    version = chains[0].version
     recording = recordings.read_csv(
         args.recording or config_file('examples/synthetic_walk.csv'),
         [name for chain in chains for name in chain.joint_names])
     if args.seconds is not None:
         recording = recording.first(args.seconds)
     domain, namespace = replays.stay_on_this_machine(), f'/leg_fk_demo_{os.getpid()}'
-    print(f'iCub legs {args.version}: {len(recording.times)} JointState messages to '
+    print(f'iCub legs {version}: {len(recording.times)} JointState messages to '
           f'foot_pose_publisher, poses back over DDS\n'
           f'(this machine only, ROS_DOMAIN_ID {domain}, namespace {namespace})\n', flush=True)
     try:
@@ -80,9 +82,8 @@ def run(args: argparse.Namespace) -> int:
     if whole and all(answers.arrived for answers in replay.answers):
         tracks = [replace(recording.track(chain), received=answers.poses).where(
             np.isfinite(answers.latencies)) for chain, answers in zip(chains, replay.answers)]
-        soles = {chain.name: catalog.chain(chain.name, args.version, 'sole') for chain in chains}
-        title = f'{args.recording.name if args.recording else "synthetic gait"}   {args.version}'
-        save_picture(lambda: feet_figure(tracks, default_instants(tracks), title, soles),
+        title = f'{args.recording.name if args.recording else "synthetic gait"}   {version}'
+        save_picture(lambda: feet_figure(tracks, default_instants(tracks), title),
                      picture, force=force)
         print(f'picture       {picture}', flush=True)
     if whole and args.save:

@@ -58,10 +58,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the explanation."""
-    catalog, chain = options.load_chain(args)
-    version = catalog.entry(chain.name).versions[chain.version]
-    e = work_out(version, chain, args.foot_frame, options.joint_positions(args, chain),
-                 args.symbolic)
+    _, chain = options.load_chain(args)
+    e = work_out(chain, options.joint_positions(args, chain), args.symbolic)
     print(text.as_json(_as_json(e)) if args.json else as_latex(e) if args.latex else as_text(e))
     return 0
 
@@ -114,7 +112,7 @@ def _blocks(e: Explanation) -> Iterator[Any]:
     """
     chain = e.chain
     yield ('title', f'{chain.name} {chain.version}: the transform `T_Ro{e.tip}`   '
-           f'(Ro = {chain.root_frame}, {e.tip} = {chain.tip_frame})')
+           f'(Ro = {chain.root_frame}, {e.tip} = {chain.frame_id})')
     if e.source:
         yield 'words', f'Table from: {e.source}'
     values = 'symbols `q_i`' if e.q is None else ', '.join(
@@ -140,7 +138,7 @@ def _blocks(e: Explanation) -> Iterator[Any]:
     yield 'equation', f'T_Ro{e.tip} = {factors}', e.T_root_tip
     if e.q is not None:
         x, y, z = (short(e.value(row[3]) or 0.0) for row in e.T_root_tip[:3])
-        yield ('words', f'{chain.tip_frame} is at x = {x}, y = {y}, z = {z} mm in '
+        yield ('words', f'{chain.frame_id} is at x = {x}, y = {y}, z = {z} mm in '
                f'{chain.root_frame}.')
         for note in text.range_notes(chain, e.q):
             yield 'words', note
@@ -189,7 +187,7 @@ def _table(e: Explanation) -> Iterator[Any]:
     """Yield step 5: the table as the documents print it, its errata, the general matrix."""
     rows = []
     for step in e.steps:
-        link, sign = step.link, '+' if step.link.sign == 1 else '-'
+        link, sign = step.link, '+' if step.link.gain > 0 else '-'
         d, theta = short(1000 * link.d), short(math.degrees(link.offset))
         if link.is_prismatic:
             d += f' {sign} {_range(1000 * link.lower, 1000 * link.upper)}'
@@ -368,7 +366,7 @@ def _as_json(e: Explanation) -> dict[str, Any]:
     chain = e.chain
     return {
         'chain': chain.name, 'version': chain.version, 'source': e.source,
-        'root_frame': chain.root_frame, 'tip_frame': chain.tip_frame,
+        'root_frame': chain.root_frame, 'frame_id': chain.frame_id,
         'units': {'length': 'mm', 'angle': 'rad'}, 'convention': chain.convention,
         'joints': list(chain.joint_names),
         'joint_positions': None if e.q is None else [

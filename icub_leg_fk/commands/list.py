@@ -3,7 +3,7 @@
 import argparse
 from typing import Any
 
-from icub_leg_fk.kinematics.catalog import ChainEntry
+from icub_leg_fk.kinematics import ChainEntry
 from icub_leg_fk.tools import options, text
 
 EXAMPLES = """\
@@ -33,7 +33,7 @@ def _as_text(entry: ChainEntry) -> str:
     rows = []
     for title, values in (
             ('tip', [f'{entry.tip}, in {table.root_frame}']),
-            ('tip frames', [f'{name}: {tip.frame}' for name, tip in table.tip_frames.items()]),
+            ('tip frames', [f'{name}: {tip.frame_id}' for name, tip in table.tip_frames.items()]),
             ('versions', [f'{name}  ({version.source})' if version.source else name
                           for name, version in entry.versions.items()]),
             ('joints', ['  '.join(joints[i:i + 6]) for i in range(0, len(joints), 6)])):
@@ -46,7 +46,7 @@ def _as_json(entry: ChainEntry) -> dict[str, Any]:
     return {
         'name': entry.name, 'tip': entry.tip, 'root_frame': table.root_frame,
         'joints': list(table.joint_names),
-        'tip_frames': {name: tip.frame for name, tip in table.tip_frames.items()},
+        'tip_frames': {name: tip.frame_id for name, tip in table.tip_frames.items()},
         'versions': [{'name': name, 'source': version.source,
                       'joint_types': [link.joint_type for link in version.links]}
                      for name, version in entry.versions.items()]}

@@ -8,7 +8,7 @@ import sys
 
 from icub_leg_fk.errors import InputFileError, LegFKError
 from icub_leg_fk.kinematics import Catalog, Chain
-from icub_leg_fk.stream.configuration import SOLE
+from icub_leg_fk.stream.configuration import LEGS
 from icub_leg_fk.tools import options
 from icub_leg_fk.tools.drawing import check_output, feet_figure, save_picture
 from icub_leg_fk.tools.recording import ChainTrack, read_bag, read_csv, time_span
@@ -37,8 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('input', metavar='INPUT', type=Path, help='bag or CSV file')
     options.add_output(parser, 'picture to write, .png, .svg or .pdf (default: the name of INPUT '
                        'with .png, in this directory)')
-    options.add(parser, '--chains', '--version', '--chain-version', '--foot-frame',
-                '--joint-topic', '--kinematics-file')
+    options.add(parser, '--chains', '--version', '--foot-frame', '--joint-topic', '--kinematics-file')
     parser.add_argument('--at', metavar='T[,T...]', type=_times,
                         help=f'up to {_INSTANTS} times [s] at which to draw the legs (default: '
                              'where one foot is highest above the other, or farthest ahead)')
@@ -76,9 +75,7 @@ def run(args: argparse.Namespace) -> int:
     instants = sorted(args.at) if args.at else default_instants(tracks)
     shown = name if len(name) <= _LONGEST_NAME else f'{name[:_LONGEST_NAME]}...'
     title = f'{shown}   {", ".join(dict.fromkeys(chain.version for chain in chains))}'
-    soles = {chain.name: catalog.chain(chain.name, chain.version, SOLE) for chain in chains
-             if SOLE in catalog.entry(chain.name).versions[chain.version].tip_frames}
-    save_picture(lambda: feet_figure(tracks, instants, title, soles), output, force=args.force)
+    save_picture(lambda: feet_figure(tracks, instants, title), output, force=args.force)
     poses = ', '.join(f'{len(track.times)} pose{"s" * (len(track.times) != 1)} of '
                       f'{track.chain.tip}' for track in tracks)
     print(f'{output}: {poses}')
@@ -123,11 +120,11 @@ def _like_degrees(track: ChainTrack) -> list[str]:
 
 def _chosen_chains(catalog: Catalog, args: argparse.Namespace) -> list[Chain]:
     """Return the chains asked for, or both legs, or else all that the catalog has."""
-    legs = [name for name in options.LEGS if name in catalog.chains]
-    names = args.chains or legs or [*catalog.chains]
-    own = options.own_versions(args, names)
-    return [catalog.chain(name, options.chosen_version(catalog, name, own.get(name, args.version)),
-                          args.foot_frame) for name in dict.fromkeys(names)]
+    legs = [name for name in LEGS if name in catalog.chains]
+    chains = catalog.select(args.chains or legs or [*catalog.chains], args.version)
+    if args.foot_frame is None:
+        return list(chains)
+    return [chain.with_frame(args.foot_frame) for chain in chains]
 
 
 def _between(tracks: Sequence[ChainTrack], begin: float | None, end: float | None

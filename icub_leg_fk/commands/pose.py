@@ -30,7 +30,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(text.as_json({
             'chain': chain.name, 'version': chain.version, 'root_frame': chain.root_frame,
-            'tip_frame': chain.tip_frame, 'position': T[:3, 3].tolist(), 'quaternion': quaternion,
+            'frame_id': chain.frame_id, 'position': T[:3, 3].tolist(), 'quaternion': quaternion,
             'matrix': T.tolist()}))
         return 0
     outside = chain.out_of_range(q)
@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     x, y, z, *xyzw = (text.fixed(value, 7) for value in (*T[:3, 3].tolist(), *quaternion))
     matrix = text.matrix([[text.fixed(value, 7) for value in row] for row in T[:3].tolist()]
                          + [['0', '0', '0', '1']], '  ')
-    print(f'{chain.name} {chain.version}: {chain.tip_frame} in {chain.root_frame}', '',
+    print(f'{chain.name} {chain.version}: {chain.frame_id} in {chain.root_frame}', '',
           *text.indented(joints), '', 'matrix (translation in m)', *text.indented(matrix), '',
           *text.columns([['position (m)', 'x', x, 'y', y, 'z', z]]), *text.columns(
               [['quaternion  ', *(word for pair in zip('xyzw', xyzw) for word in pair)]]),

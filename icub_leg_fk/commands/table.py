@@ -9,7 +9,6 @@ import tempfile
 
 from icub_leg_fk.errors import LegFKError
 from icub_leg_fk.kinematics import Catalog, Chain, chain_from_urdf, DHLink, Urdf
-from icub_leg_fk.kinematics.chain import modified_rows
 from icub_leg_fk.kinematics.rotation import angle_between, Array
 from icub_leg_fk.kinematics.table_from_urdf import almost_parallel
 from icub_leg_fk.tools import options
@@ -78,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
         lines.append(f'{chain.name}: {chain.n} joints; largest difference from the URDF in '
                      f'{_SAMPLES} postures: {metres:.1g} m, {radians:.1g} rad')
         lines += [f'  taken as parallel: the axes of {one} and {two}, {angle:.1g} rad apart'
-                  for one, two, angle in almost_parallel(urdf, args.root, chain.tip_frame,
+                  for one, two, angle in almost_parallel(urdf, args.root, chain.frame_id,
                                                          args.tolerance)]
         lines += [f'  {len(chain.links) - chain.n} fixed rows between axes that are almost '
                   'parallel'] if len(chain.links) > chain.n else []
@@ -96,7 +95,7 @@ def largest_difference(chain: Chain, urdf: Urdf) -> tuple[float, float]:
     upper = np.where(np.isfinite(chain.upper), chain.upper, math.pi)
     Q = rng.uniform(lower, upper, (_SAMPLES, chain.n))
     ours = chain.forward(Q)
-    theirs = urdf.forward(chain.root_frame, chain.tip_frame,
+    theirs = urdf.forward(chain.root_frame, chain.frame_id,
                           dict(zip(chain.joint_names, Q.T, strict=True)))
     off = np.linalg.norm(ours[:, :3, 3] - theirs[:, :3, 3], axis=1)
     return float(off.max()), float(angle_between(ours[:, :3, :3], theirs[:, :3, :3]).max())
@@ -114,11 +113,11 @@ def table_text(urdf: Urdf, chains: list[Chain], tolerance: float) -> str:
 
 
 def _chain_lines(chain: Chain, urdf: Urdf) -> list[str]:
-    rows = modified_rows(chain) if chain.convention == 'modified' else chain.links
+    rows = tuple(row.link for row in chain.rows())
     lines = [f'  {chain.name}:', f'    tip: {_word(chain.name)}',
              f'    root_frame: {chain.root_frame}',
              f'    joints: [{", ".join(chain.joint_names)}]',
-             f'    tip_frames: {{{_word(chain.tip_frame)}: {{frame: {chain.tip_frame}}}}}',
+             f'    tip_frames: {{{_word(chain.frame_id)}: {{frame: {chain.frame_id}}}}}',
              '    versions:', f'      {VERSION}:',
              f'        source: "{_comment(Path(urdf.file).name)}"']
     if chain.convention == 'modified':
@@ -139,8 +138,8 @@ def _row_lines(rows: tuple[DHLink, ...]) -> list[str]:
             more += f', range: [{short(scale * lower, 9)}, {short(scale * upper, 9)}]'
         if row.joint_type != 'revolute':
             more += f', type: {row.joint_type}'
-        if row.sign != 1:
-            more += ', sign: -1'
+        if row.gain != 1.0:
+            more += f', gain: {row.gain:.17g}'
         cells.append((short(1000 * row.a, 10), short(1000 * row.d, 10),
                       short(math.degrees(row.alpha), 13),
                       short(math.degrees(row.offset), 13), more))

@@ -6,16 +6,14 @@ link, A_i at q = 0, becomes the fixed origin of the next joint. Every joint move
 
 import argparse
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Sequence
 import math
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from icub_leg_fk.errors import LegFKError, UnknownNameError
-from icub_leg_fk.kinematics import Catalog, DHLink
-from icub_leg_fk.kinematics.catalog import ChainVersion
+from icub_leg_fk.kinematics import Catalog, Chain, DHLink
 from icub_leg_fk.kinematics.rotation import Array
-from icub_leg_fk.stream.configuration import SOLE_OUTLINE
 from icub_leg_fk.tools import options
 from icub_leg_fk.tools.output_file import write_text
 import numpy as np
@@ -28,7 +26,7 @@ from the root frame, which the chains must share.
 examples:
   leg_fk urdf -o legs.urdf
   leg_fk urdf left_leg --version v1
-  leg_fk urdf left_leg right_leg head_imu --chain-version head_imu=v2 -o icub.urdf
+  leg_fk urdf left_leg right_leg head_imu=v2 -o icub.urdf
   leg_fk urdf -k my_robot.yaml --version v1 --name my_robot"""
 
 _PLACEHOLDER = '50000'  # effort and velocity, which URDF demands and no table gives
@@ -40,11 +38,11 @@ _NOWHERE = np.zeros(3)
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument('chains', metavar='CHAIN', nargs='*',
-                        help='chains to write (default: all that have the version asked for)')
+                        help='chains to write, such as left_leg or head_imu=v2 (default: all that have the '
+                        'version asked for)')
     parser.add_argument('--name', help='name of the robot (default: icub, or that of your file)')
-    options.add(parser, '--version', '--chain-version', '--kinematics-file')
+    options.add(parser, '--version', '--kinematics-file')
     options.add_output(parser, 'file to write (default: standard output)')
-    parser.set_defaults(version=options.DEFAULT_VERSION)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -53,44 +51,44 @@ def run(args: argparse.Namespace) -> int:
     robot = args.name or ('icub' if args.kinematics_file is None else Path(catalog.file).stem)
     if not robot.isprintable():
         raise LegFKError(f'--name: found {robot!r}, allowed: printable text')
-    write_text(args.output, urdf_text(robot, _tables(catalog, args)), force=args.force)
+    write_text(args.output, urdf_text(robot, _chosen_chains(catalog, args)), force=args.force)
     return 0
 
 
-def _tables(catalog: Catalog, args: argparse.Namespace) -> dict[tuple[str, str], ChainVersion]:
-    """Return the tables asked for, by chain and version."""
-    own = options.own_versions(args, args.chains or list(catalog.chains))
-    names = args.chains or [name for name, entry in catalog.chains.items()
-                            if name in own or args.version in entry.versions]
+def _chosen_chains(catalog: Catalog, args: argparse.Namespace) -> tuple[Chain, ...]:
+    """Return the chains asked for, or all that have the version asked for."""
+    if args.chains:
+        return catalog.select(args.chains, args.version)
+    names = [name for name, entry in catalog.chains.items()
+             if args.version is None or args.version in entry.versions]
     if not names:
-        raise UnknownNameError('version', args.version, dict.fromkeys(
-            version for entry in catalog.chains.values() for version in entry.versions))
-    chains = [catalog.chain(name, own.get(name, args.version)) for name in names]
-    return {(chain.name, chain.version): catalog.entry(chain.name).versions[chain.version]
-            for chain in chains}
+        known = dict.fromkeys(version for entry in catalog.chains.values()
+                              for version in entry.versions)
+        raise UnknownNameError('version', args.version, known)
+    return catalog.select(names, args.version)
 
 
-def urdf_text(robot: str, tables: Mapping[tuple[str, str], ChainVersion]) -> str:
-    """Return the URDF of a robot of some chains, at least one, by chain and version.
+def urdf_text(robot: str, chains: Sequence[Chain]) -> str:
+    """Return the URDF of a robot of some chains, at least one.
 
     Raises:
         LegFKError: the chains have different roots or share a name, or a joint has no range.
     """
-    roots = sorted({table.root_frame for table in tables.values()})
+    roots = sorted({chain.root_frame for chain in chains})
     if len(roots) > 1:
         raise LegFKError(f'a URDF has one root: found {", ".join(roots)}; choose chains with the '
                          'same root_frame')
     model = ET.Element('robot', name=robot)
     _comment(model, 'Written by `leg_fk urdf` from the Denavit-Hartenberg tables of '
-             f'{", ".join(map(" ".join, tables))}.')
+             f'{", ".join(f"{chain.name} {chain.version}" for chain in chains)}.')
     _comment(model, 'Links have no inertia; effort and velocity limits are placeholders.')
     for name, rgba in _COLOURS.items():
         ET.SubElement(ET.SubElement(model, 'material', name=name), 'color', rgba=rgba)
     base = ET.SubElement(model, 'link', name=roots[0])
     joints: dict[str, tuple[str, DHLink, Array]] = {}
-    for (chain, _), table in tables.items():
-        _draw_bone(base, table.T_root_0[:3, 3])
-        _add_chain(model, joints, chain, table)
+    for chain in chains:
+        _draw_bone(base, chain.T_root_0[:3, 3])
+        _add_chain(model, joints, chain)
     for (kind, twice), count in Counter(
             (element.tag, element.get('name')) for element in model).items():
         if count > 1 and kind in ('link', 'joint'):
@@ -114,15 +112,15 @@ def xyz_rpy(T: Array) -> tuple[Array, Array]:
     return T[:3, 3], np.array([roll, pitch, yaw])
 
 
-def _add_chain(model: ET.Element, joints: dict[str, tuple[str, DHLink, Array]], chain: str,
-               table: ChainVersion) -> None:
+def _add_chain(model: ET.Element, joints: dict[str, tuple[str, DHLink, Array]], chain: Chain
+               ) -> None:
     """Add a chain; `joints` are those that are there, with parent and origin: each is there once.
 
     A joint that is elsewhere in another chain is refused.
     """
-    origin, parent = table.T_root_0, table.root_frame
-    names = iter(table.joint_names)
-    for link in table.links:
+    origin, parent = chain.T_root_0, chain.root_frame
+    names = iter(chain.joint_names)
+    for link in chain.links:
         if link.is_fixed:
             origin = origin @ link.transform()
             continue
@@ -132,28 +130,29 @@ def _add_chain(model: ET.Element, joints: dict[str, tuple[str, DHLink, Array]], 
             # It may be elsewhere along and about its axis, which makes no difference to it.
             T = np.linalg.inv(place) @ origin
             off_axis = np.hstack((T[:3, 2] - (0, 0, 1), T[:2, 3] * (not link.is_prismatic)))
-            if np.abs(off_axis).max() > 1e-9 or (parent, link.joint_type, link.sign) != (
-                    other_parent, other.joint_type, other.sign):
-                raise LegFKError(f'joint {name!r} of chain {chain} is elsewhere in another chain; '
+            if np.abs(off_axis).max() > 1e-9 or (parent, link.joint_type, link.gain) != (
+                    other_parent, other.joint_type, other.gain):
+                raise LegFKError(f'joint {name!r} of chain {chain.name} is elsewhere in another chain; '
                                  'choose chains that agree on the joints they share')
             origin = T @ link.transform()
         else:
             joints[name] = parent, link, origin
-            _add_joint(model, chain, name, link, origin, parent)
+            _add_joint(model, chain.name, name, link, origin, parent)
             origin = link.transform()
             body = ET.SubElement(model, 'link', name=f'{name}_link')
             _draw(body, 'joint', 'sphere', radius=_JOINT_RADIUS)
             _draw_bone(body, origin[:3, 3])
         parent = f'{name}_link'
-    for name, frame in table.tip_frames.items():
-        _place(ET.SubElement(model, 'joint', name=f'{frame.frame}_joint', type='fixed'),
-               origin @ table.T_n_tip @ frame.T_dh_tip, parent, frame.frame)
-        tip = ET.SubElement(model, 'link', name=frame.frame)
-        if name == 'sole':
-            corners = np.array(SOLE_OUTLINE)
+    has_sole = any(frame.outline is not None for frame in chain.tip_frames.values())
+    for frame in chain.tip_frames.values():
+        _place(ET.SubElement(model, 'joint', name=f'{frame.frame_id}_joint', type='fixed'),
+               origin @ chain.T_n_tip @ frame.T_tip_frame, parent, frame.frame_id)
+        tip = ET.SubElement(model, 'link', name=frame.frame_id)
+        if frame.outline is not None:
+            corners = np.pad(frame.outline, ((0, 0), (0, 1)))
             low, high = corners.min(axis=0), corners.max(axis=0) + (0.0, 0.0, _SOLE_THICKNESS)
             _draw(tip, 'tip', 'box', (low + high) / 2, size='{:g} {:g} {:g}'.format(*high - low))
-        elif 'sole' not in table.tip_frames:
+        elif not has_sole:
             _draw(tip, 'tip', 'sphere', radius=_TIP_RADIUS)
 
 
@@ -166,7 +165,7 @@ def _add_joint(model: ET.Element, chain: str, name: str, link: DHLink, origin: A
     joint = ET.SubElement(model, 'joint', name=name,
                           type=link.joint_type if math.isfinite(lower) else 'continuous')
     _place(joint, origin, parent, f'{name}_link')
-    ET.SubElement(joint, 'axis', xyz=f'0 0 {link.sign}')
+    ET.SubElement(joint, 'axis', xyz=f'0 0 {link.gain:g}')
     if link.erratum:
         _comment(joint, f'Erratum of the printed table: {link.erratum}')
     if math.isfinite(lower):

@@ -1,7 +1,8 @@
-"""What the value classes of this room share: arrays nobody can write to, equality and hash."""
+"""What the value classes of this room share: contents nobody can write to, equality and hash."""
 
 from collections.abc import Hashable, Mapping
 from dataclasses import Field, fields
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -10,22 +11,18 @@ import numpy as np
 class Frozen:
     """Base of a frozen dataclass that holds arrays or mappings.
 
-    Arrays are read-only copies, also after copying and pickling. Two instances are equal if their
-    compared fields are, by value; -0.0 equals 0.0.
+    Arrays and mappings are read-only copies, also after copying and pickling. Two instances are
+    equal if their compared fields are, by value; -0.0 equals 0.0.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, np.ndarray):
-                value = np.array(value, dtype=float)
-                value.flags.writeable = False
-                object.__setattr__(self, field.name, value)
+            object.__setattr__(self, field.name, _read_only(getattr(self, field.name)))
 
     def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
-        return type(self), tuple(getattr(self, field.name) for field in fields(self))
+        return type(self), tuple(_picklable(getattr(self, field.name)) for field in fields(self))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, type(self)) and self._key() == other._key()
@@ -36,6 +33,20 @@ class Frozen:
     def _key(self) -> Hashable:
         return tuple(_hashable(getattr(self, field.name))
                      for field in fields(self) if field.compare)
+
+
+def _read_only(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        array = np.array(value, dtype=float)
+        array.flags.writeable = False
+        return array
+    if isinstance(value, Mapping):
+        return MappingProxyType(dict(value))
+    return value
+
+
+def _picklable(value: Any) -> Any:
+    return dict(value) if isinstance(value, Mapping) else value
 
 
 def _hashable(value: Any) -> Hashable:

@@ -1,43 +1,34 @@
 """Rotations: unit quaternions in ROS order (x, y, z, w), and exact right angles."""
 
 import math
-from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
-_QUADRANTS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
-_RIGHT = 1e-15  # quarter turns from a right angle that are rounding
+_COSINES = np.array((1.0, 0.0, -1.0, 0.0))  # after 0, 1, 2 and 3 right angles
+_SINES = np.array((0.0, 1.0, 0.0, -1.0))
+_ROUNDING = 1e-15  # relative; an angle this near to a right one differs by rounding alone
+_MOST_RIGHT_ANGLES = 8  # beyond two turns such a relative difference is more than rounding
 _LIKELY = 1e-6  # components of a unit quaternion that differ by less may be equal but for rounding
 
 
-@overload
-def cos_sin(angle: float) -> tuple[float, float]: ...
-
-
-@overload
-def cos_sin(angle: Array) -> tuple[Array, Array]: ...
-
-
-def cos_sin(angle: float | Array) -> tuple[float, float] | tuple[Array, Array]:
-    """Return cosine and sine of angles [rad], exact at every multiple of a right angle.
+def cos_sin(angle: ArrayLike) -> tuple[Array, Array]:
+    """Return cosine and sine of (...) angles [rad], exact at right angles up to two turns.
 
     DH tables are full of right angles; cos(pi/2) must be 0 there and not 6e-17.
     """
-    if isinstance(angle, float):
-        quarter_turns = angle / (math.pi / 2)
-        nearest = round(quarter_turns)
-        if abs(quarter_turns - nearest) < _RIGHT * max(1, abs(nearest)):
-            return _QUADRANTS[nearest % 4]
-        return math.cos(angle), math.sin(angle)
-    turns = angle / (math.pi / 2)
-    whole = np.rint(turns)
-    right = np.abs(turns - whole) < _RIGHT * np.maximum(1, np.abs(whole))
-    exact = np.array(_QUADRANTS)[np.mod(whole, 4).astype(int)]
-    return (np.where(right, exact[..., 0], np.cos(angle)),
-            np.where(right, exact[..., 1], np.sin(angle)))
+    theta = np.asarray(angle, dtype=float)
+    right_angles = theta / (math.pi / 2)
+    nearest = np.rint(right_angles)
+    apart = np.abs(right_angles - nearest)
+    is_near = apart < _ROUNDING * np.maximum(1.0, np.abs(nearest))
+    is_right = is_near & (np.abs(nearest) <= _MOST_RIGHT_ANGLES)
+    quadrant = np.where(is_right, nearest, 0.0).astype(int) % 4
+    cosine = np.where(is_right, _COSINES[quadrant], np.cos(theta))
+    sine = np.where(is_right, _SINES[quadrant], np.sin(theta))
+    return cosine, sine
 
 
 def matrix_to_quaternion(rotation: ArrayLike) -> Array:
@@ -54,10 +45,12 @@ def matrix_to_quaternion(rotation: ArrayLike) -> Array:
     """
     R = np.asarray(rotation, dtype=float)
     r00, r11, r22 = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
-    yz, xz, xy = (R[..., 2, 1] + R[..., 1, 2], R[..., 0, 2] + R[..., 2, 0],
-                  R[..., 1, 0] + R[..., 0, 1])
-    wx, wy, wz = (R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0],
-                  R[..., 1, 0] - R[..., 0, 1])
+    yz = R[..., 2, 1] + R[..., 1, 2]
+    xz = R[..., 0, 2] + R[..., 2, 0]
+    xy = R[..., 1, 0] + R[..., 0, 1]
+    wx = R[..., 2, 1] - R[..., 1, 2]
+    wy = R[..., 0, 2] - R[..., 2, 0]
+    wz = R[..., 1, 0] - R[..., 0, 1]
     # 4 q q^T: row k is the quaternion times four times its own component k.
     outer = np.stack([
         np.stack([1 + r00 - r11 - r22, xy, xz, wx], axis=-1),

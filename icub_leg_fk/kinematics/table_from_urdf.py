@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from icub_leg_fk.errors import InputFileError
-from icub_leg_fk.kinematics.chain import Chain, CONVENTIONS
+from icub_leg_fk.kinematics.chain import Chain, CONVENTIONS, TipFrame
 from icub_leg_fk.kinematics.link import DHLink
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.kinematics.urdf_file import MOVING, Urdf
@@ -58,8 +58,9 @@ def chain_from_urdf(urdf: Urdf | str | Path, root: str, tip: str, *, name: str =
         T_n_tip = DHLink(a=last.a, d=0.0, alpha=last.alpha).transform() @ T_n_tip
         links[-1] = _link(last.joint_type, 0.0, last.d, 0.0, last.offset, last.lower, last.upper)
     return Chain(
-        name=name or tip, version=version, root_frame=root, tip=name or tip, tip_frame=tip,
+        name=name or tip, version=version, root_frame=root, tip=name or tip,
         joint_names=tuple(axis.joint for axis in axes), links=tuple(links),
+        tip_frames={tip: TipFrame(tip)},
         T_root_0=_rounded(frames[0]), T_n_tip=T_n_tip, convention=convention)
 
 

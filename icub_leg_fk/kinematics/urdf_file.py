@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple, NoReturn
 from xml.etree import ElementTree as ET
 
-from icub_leg_fk.errors import InputFileError, near
+from icub_leg_fk.errors import closest, InputFileError
 from icub_leg_fk.kinematics.rotation import Array, turns_about
 import numpy as np
 
@@ -81,7 +81,7 @@ class Urdf:
         """
         for link in (root, tip):
             if link not in self.links:
-                guess = near(link, self.links) or next(
+                guess = closest(link, self.links) or next(
                     (name for name in self.links if link.casefold() in name.casefold()), None)
                 shown = ', '.join(self.links[:_LISTED])
                 more = ' and more' if len(self.links) > _LISTED else ''

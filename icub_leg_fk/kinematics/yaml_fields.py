@@ -1,9 +1,9 @@
 """From a YAML file of any content to fields that know their place, or one error.
 
-`yaml.safe_load` would forget the lines, keep only the last of two equal keys, expand aliases and
-read `1:30` as 90. Here the text is bounded in size and depth, holds one document without aliases
-and tags, and becomes yaml's nodes: plain text with its place. The nodes are read one by one, so
-that every complaint can name its place.
+`yaml.safe_load` would forget the lines, keep only the last of two equal keys and read `1:30` as
+90. So the file becomes yaml's nodes, plain text with its place, which are read one by one: every
+complaint can name its place, and no object is ever made from a tag. An alias is the very node
+that it names.
 """
 
 from __future__ import annotations
@@ -16,25 +16,32 @@ import re
 import reprlib
 from typing import Any, NoReturn
 
-from icub_leg_fk.errors import CatalogError, near
+from icub_leg_fk.errors import CatalogError, closest
 import yaml
 
 MAX_BYTES = 1_000_000
-MAX_DEPTH = 16
 
 # libyaml, where PyYAML was built with it, is thirty times as fast as the loader in Python.
 Loader: Any = getattr(yaml, 'CBaseLoader', yaml.BaseLoader)
 
-_UNPRINTABLE = re.compile('[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]')
 _NUMBER = re.compile(r'[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]{1,3})?')
 _PI = re.compile(r'([-+]?)(?:([0-9]{1,3}) ?\* ?)?pi(?: ?/ ?([1-9][0-9]{0,2}))?')
-NAME = re.compile(r'[A-Za-z0-9_./-]{1,100}')
-FRAME = re.compile(r'[A-Za-z0-9_.-][A-Za-z0-9_./-]{0,99}')  # tf2 cannot look up a leading slash
-WORD = re.compile(r'[A-Za-z][A-Za-z0-9_]{0,63}')  # also a part of topic and parameter names
-_NAMED = {NAME: 'up to 100 letters, digits and _ . / -',
-          FRAME: 'up to 100 letters, digits and _ . / -, not beginning with /',
-          WORD: 'a letter, then up to 63 letters, digits and _'}
-_LINE = re.compile(r'.{0,300}')
+
+
+@dataclass(frozen=True)
+class TextKind:
+    """What a text in the file has to look like: a pattern, and how to say it."""
+
+    pattern: re.Pattern[str]
+    allowed: str
+
+
+NAME = TextKind(re.compile(r'(?=.*\S).{1,300}'), 'up to 300 printable characters')
+FRAME_ID = TextKind(re.compile(r'(?!/)(?=.*\S).{1,300}'),  # tf2 cannot look up a leading slash
+                    'up to 300 printable characters, not beginning with /')
+WORD = TextKind(re.compile(r'[A-Za-z][A-Za-z0-9_]{0,63}'),
+                'a letter, then up to 63 letters, digits and _')
+LINE = TextKind(re.compile(r'.{0,300}'), 'text of one line')
 
 _short = reprlib.Repr()
 _short.maxstring = 60
@@ -59,11 +66,14 @@ class Field:
 
     def found(self) -> str:
         """Return what stands here, short enough for one line."""
-        if isinstance(self.node, yaml.ScalarNode):
-            if self._is_quoted():
-                return f'the text {_short.repr(self.node.value)}'
-            return _short.repr(self.node.value) if self.node.value else 'nothing'
-        return 'a list' if isinstance(self.node, yaml.SequenceNode) else 'a mapping'
+        if isinstance(self.node, yaml.SequenceNode):
+            return 'a list'
+        if not isinstance(self.node, yaml.ScalarNode):
+            return 'a mapping'
+        shown = _short.repr(self.node.value)
+        if self._is_quoted():
+            return f'the text {shown}'
+        return shown if self.node.value else 'nothing'
 
     def at(self, place: str) -> Field:
         """Return the same node, with its place described more closely."""
@@ -71,23 +81,24 @@ class Field:
 
     def has(self, key: str) -> bool:
         """Return whether this is a mapping with a key of that name."""
-        return isinstance(self.node, yaml.MappingNode) and any(
-            name.value == key for name, _ in self.node.value)
+        if not isinstance(self.node, yaml.MappingNode):
+            return False
+        return any(name.value == key for name, _ in self.node.value)
 
-    def mapping(self, kind: str, where: Callable[[str], str],
-                pattern: re.Pattern[str] = NAME) -> dict[str, Field]:
+    def mapping(self, content: str, where: Callable[[str], str],
+                kind: TextKind = NAME) -> dict[str, Field]:
         """Return the values of a mapping by name, refusing a key that stands twice.
 
         Args:
-            kind: what the mapping holds, for the error.
-            where: how to call the place of a value, given its key.
-            pattern: what a key looks like.
+            content: what the mapping holds, for the error.
+            where: returns the words for the place of a value, given its key.
+            kind: what a key looks like.
         """
         if not isinstance(self.node, yaml.MappingNode):
-            self.fail(kind)
+            self.fail(content)
         fields: dict[str, Field] = {}
         for key, value in self.node.value:
-            name = Field(self.file, self.where, key).name('a name', pattern)
+            name = Field(self.file, self.where, key).name('a name', kind)
             if name in fields:
                 Field(self.file, where(name), key).fail('each key once', 'a duplicate key')
             fields[name] = Field(self.file, where(name), value)
@@ -96,26 +107,27 @@ class Field:
     def record(self, required: tuple[str, ...], optional: tuple[str, ...] = ()
                ) -> dict[str, Field]:
         """Return the fields of a mapping whose keys are fixed."""
-        known = ', '.join(required + optional)
-        fields = self.mapping(f'a mapping with {known}', lambda key: f'{self.where}, field {key}')
+        known = required + optional
+        fields = self.mapping(f'a mapping with {", ".join(known)}',
+                              lambda key: f'{self.where}, field {key}')
         for key, _ in self.node.value:
-            if key.value not in required + optional:
-                guess = near(key.value, required + optional)
+            if key.value not in known:
+                guess = closest(key.value, known)
                 hint = f' (did you mean {guess!r}?)' if guess else ''
                 Field(self.file, self.where, key).fail(
-                    known, f'unknown key {_short.repr(key.value)}{hint}')
+                    ', '.join(known), f'unknown key {_short.repr(key.value)}{hint}')
         for name in required:
             if name not in fields:
                 self.at(f'field {name}').fail(f'all of {", ".join(required)}', 'nothing')
         return fields
 
-    def items(self, kind: str, length: int | None = None) -> Iterator[Field]:
-        """Yield the items of a list."""
+    def items(self, content: str, length: int | None = None) -> Iterator[Field]:
+        """Yield the items of a list, at least one, or so many."""
         if not isinstance(self.node, yaml.SequenceNode):
-            self.fail(kind)
+            self.fail(content)
         count = len(self.node.value)
-        if count != (count if length is None else length) or not count:
-            self.fail(kind, f'{count} item{"s" * (count != 1)}')
+        if count == 0 or (length is not None and count != length):
+            self.fail(content, f'{count} item{"s" * (count != 1)}')
         for item in self.node.value:
             yield Field(self.file, self.where, item)
 
@@ -135,23 +147,23 @@ class Field:
         angle = math.pi * float(factor or 1) / float(divisor or 1)
         return -angle if sign == '-' else angle
 
-    def name(self, kind: str, pattern: re.Pattern[str] = NAME) -> str:
-        """Return a word."""
-        text = self._scalar(pattern)
-        if text is None:
-            self.fail(f'{kind}: {_NAMED[pattern]}')
+    def name(self, what: str, kind: TextKind = NAME) -> str:
+        """Return a name, quoted or not."""
+        text = self._scalar(kind.pattern)
+        if text is None or not text.isprintable():
+            self.fail(f'{what}: {kind.allowed}')
         return text
 
     def text(self) -> str:
         """Return free text of one line."""
-        text = self._scalar(_LINE)
+        text = self._scalar(LINE.pattern)
         if text is None or not text.isprintable():
-            self.fail('text of one line')
+            self.fail(LINE.allowed)
         return text
 
     def choice(self, choices: tuple[str, ...]) -> str:
         """Return one of some words."""
-        text = self._scalar(_LINE)
+        text = self._scalar(LINE.pattern)
         if text not in choices:
             self.fail(' or '.join(choices))
         return text
@@ -170,22 +182,23 @@ def read_yaml(path: str | Path) -> Field:
     """Return the root of a YAML file.
 
     Raises:
-        CatalogError: it cannot be read, is too large, nests too deep, holds an alias, a tag or
-            more than one document, or is not YAML.
+        CatalogError: it cannot be read, is too large, or is not one document of YAML.
     """
     file = str(path) if str(path).isprintable() else repr(str(path))
-    text = _decode(file, _read(file, path))
+    data = _read(file, path)
     try:
-        _refuse_surprises(file, text)
-        node = yaml.compose(text, Loader=Loader)
-    except yaml.YAMLError as error:
-        mark = getattr(error, 'problem_mark', None) or getattr(error, 'context_mark', None)
-        problem = getattr(error, 'problem', None) or getattr(error, 'context', None) or error
-        line = mark.line + 1 if mark else 0
-        if 'nesting depth' in str(problem):  # libyaml looks ahead, and has a limit of its own
-            _fail_too_deep(file, line)
-        found = f'text that is not YAML ({" ".join(str(problem).split())})'
-        _fail(file, line, found, 'well-formed YAML')
+        node = yaml.compose(data, Loader=Loader)
+    except yaml.reader.ReaderError as error:  # bytes that are no text, or no printable text
+        line = data.count(b'\n', 0, error.position) + 1
+        _fail(file, line, f'a byte or character that is no printable UTF-8 text ({error.reason})',
+              'UTF-8 text')
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        problem = ' '.join(str(error.problem or error.context).split())
+        _fail(file, mark.line + 1 if mark else 0, f'text that is not YAML ({problem})',
+              'one document of well-formed YAML')
+    except RecursionError:
+        _fail(file, 0, 'too many nested levels', 'well-formed YAML')
     if node is None:
         _fail(file, 0, 'nothing', 'units and chains')
     return Field(file, 'kinematics file', node)
@@ -195,50 +208,13 @@ def _fail(file: str, line: int, found: str, allowed: str) -> NoReturn:
     raise CatalogError(file, line, 'kinematics file', found, allowed) from None
 
 
-def _fail_too_deep(file: str, line: int) -> NoReturn:
-    _fail(file, line, f'more than {MAX_DEPTH} nested levels', f'at most {MAX_DEPTH}')
-
-
 def _read(file: str, path: str | Path) -> bytes:
     try:
         with open(path, 'rb') as stream:
             data = stream.read(MAX_BYTES + 1)
-    except OSError as error:
-        _fail(file, 0, error.strerror or str(error), 'a readable YAML file')
-    except ValueError as error:  # a zero byte in the path
-        _fail(file, 0, str(error), 'a readable YAML file')
+    except (OSError, ValueError) as error:  # a ValueError for a zero byte in the path
+        reason = getattr(error, 'strerror', None) or str(error)
+        raise CatalogError(file, 0, '', reason, 'a readable kinematics file') from None
     if len(data) > MAX_BYTES:
         _fail(file, 0, f'more than {MAX_BYTES} bytes', f'at most {MAX_BYTES} bytes')
     return data
-
-
-def _decode(file: str, data: bytes) -> str:
-    try:
-        text = data.decode('utf-8-sig')
-    except UnicodeDecodeError as error:
-        line = data.count(b'\n', 0, error.start) + 1
-        _fail(file, line, f'byte 0x{data[error.start]:02x}', 'UTF-8 text')
-    unprintable = _UNPRINTABLE.search(text)
-    if unprintable:
-        line = text.count('\n', 0, unprintable.start()) + 1
-        _fail(file, line, f'character U+{ord(unprintable.group()):04X}', 'printable text')
-    return text
-
-
-def _refuse_surprises(file: str, text: str) -> None:
-    """Refuse what is YAML, but has no place in a kinematics file."""
-    depth, documents = 0, 0
-    event: Any
-    for event in yaml.parse(text, Loader=Loader):
-        line = event.start_mark.line + 1
-        if isinstance(event, yaml.AliasEvent):
-            _fail(file, line, f'alias *{event.anchor}', 'plain values')
-        if getattr(event, 'tag', None):
-            _fail(file, line, f'tag {event.tag}', 'plain values')
-        documents += isinstance(event, yaml.DocumentStartEvent)
-        if documents > 1:
-            _fail(file, line, 'a second document', 'one document')
-        depth += isinstance(event, yaml.CollectionStartEvent)
-        depth -= isinstance(event, yaml.CollectionEndEvent)
-        if depth > MAX_DEPTH:
-            _fail_too_deep(file, line)

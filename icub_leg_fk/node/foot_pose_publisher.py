@@ -70,6 +70,6 @@ def _published(configuration: Configuration) -> str:
         ('skeletons', configuration.publish_markers)) if wanted)]
     chains = ', '.join(
         f'{chain.tip} ({chain.name} {chain.version}, {prefix}{chain.root_frame} to '
-        f'{prefix}{chain.tip_frame})' for chain in configuration.chains)
+        f'{prefix}{chain.frame_id})' for chain in configuration.chains)
     kinds[-2:] = [' and '.join(kinds[-2:])]
     return f'{", ".join(kinds)} of {chains}'

@@ -92,7 +92,7 @@ class Outputs:
         from icub_leg_fk.node.skeleton import skeleton_markers
         configuration = self._configuration
         assert configuration is not None
-        return skeleton_markers(configuration.chains[index], configuration.soles[index], q,
+        return skeleton_markers(configuration.chains[index], q,
                                 Time(sec=sec, nanosec=nanosec), configuration.frame_prefix)
 
     def _create(self, topic: str, message_type: Any) -> Publisher:

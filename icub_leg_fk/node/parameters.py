@@ -1,22 +1,21 @@
 """The node's parameters: declared with type, description and bounds; changed all or nothing."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from importlib.util import find_spec
 from typing import Any, NamedTuple
 
-from icub_leg_fk.errors import LegFKError, near, ParameterError
+from icub_leg_fk.errors import closest, LegFKError, ParameterError
 from icub_leg_fk.kinematics import Catalog
 from icub_leg_fk.stream.configuration import (
     Configuration,
     DEFAULT_TIMEOUT,
     LONGEST_TIMEOUT,
     STAMP_SOURCES,
-    version_parameter,
 )
 from icub_leg_fk.node.qos_overrides import check_qos_override, PREFIX
 from rcl_interfaces.msg import (
     FloatingPointRange,
     ParameterDescriptor,
-    ParameterType,
     SetParametersResult,
 )
 from rclpy.exceptions import ParameterException, ParameterUninitializedException
@@ -30,11 +29,13 @@ class _Parameter(NamedTuple):
     description: str
     constraints: str = ''
     largest: float | None = None
+    read_only: bool = False
 
     def descriptor(self) -> ParameterDescriptor:
         """Return what `ros2 param describe` shows."""
         descriptor = ParameterDescriptor(description=self.description,
-                                         additional_constraints=self.constraints)
+                                         additional_constraints=self.constraints,
+                                         read_only=self.read_only)
         if self.largest is not None:
             descriptor.floating_point_range = [
                 FloatingPointRange(from_value=0.0, to_value=self.largest, step=0.0)]
@@ -43,11 +44,12 @@ class _Parameter(NamedTuple):
 
 _PARAMETERS = (
     _Parameter('chains', ['left_leg', 'right_leg'], 'Chains whose tip poses are published.',
-               'a list of chains of the kinematics file, each once, such as [left_leg]'),
-    _Parameter('version', 'v2_5', 'Version of every chain that sets none of its own.',
+               'a list of chains of the kinematics file, each once, such as [left_leg, head_imu=v2]',
+               read_only=True),
+    _Parameter('version', '', 'Version of every chain that is named without one; empty: its default.',
                'a version of the kinematics file, such as v2_5 (leg_fk list shows them)'),
     _Parameter('kinematics_file', '', 'Kinematics file to read; empty is the shipped one.',
-               'path of a YAML file'),
+               'path of a YAML file', read_only=True),
     _Parameter('foot_frame', 'dh', "Axes of the tip: the table's last frame, or the sole.",
                'a tip frame of the kinematics file, such as dh or sole'),
     _Parameter('frame_prefix', '', 'Put before every frame id.',
@@ -70,8 +72,8 @@ _COMMON_ELSEWHERE = ('frame_id', 'root_frame', 'base_frame', 'tf_prefix', 'publi
 def is_parameter_name(name: str) -> bool:
     """Return whether this is the name of a parameter of the node, or nearly so."""
     names = [parameter.name for parameter in _PARAMETERS]
-    return (name in (*names, *_RCLPYS_OWN) or name.endswith('.version') or
-            name.startswith(PREFIX) or near(name, names) is not None)
+    return (name in (*names, *_RCLPYS_OWN) or name.startswith(PREFIX)
+            or closest(name, names) is not None)
 
 
 class NodeParameters:
@@ -96,13 +98,10 @@ class NodeParameters:
         for parameter in _PARAMETERS:
             self._declare(parameter)
         self._catalog = Catalog.load(node.get_parameter('kinematics_file').value or None)
-        for parameter in self._version_parameters():
-            self._declare(parameter)
         self._check_overrides()
-        self.configuration = Configuration.from_parameters(self._values(), self._catalog)
+        self.configuration = _configuration(self._catalog, self._values())
         self._declaring = False
-        self._candidate: tuple[Catalog, Configuration] | None = None
-        node.add_pre_set_parameters_callback(_with_typed_lists)
+        self._candidate: Configuration | None = None
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._adopt)
 
@@ -113,39 +112,15 @@ class NodeParameters:
         except ParameterException as error:
             overrides = self._node._parameter_overrides
             raise ParameterError(
-                f'parameter {parameter.name}: found {overrides[parameter.name].value!r}, allowed: '
+                parameter.name, f'found {overrides[parameter.name].value!r}, allowed: '
                 f'{parameter.constraints or _kind(parameter)}') from error
-
-    def _version_parameters(self) -> list[_Parameter]:
-        return [_Parameter(version_parameter(chain), '',
-                           f'Version of {chain}; empty is that of version.',
-                           f'{", ".join(entry.versions)}, or empty')
-                for chain, entry in self._catalog.chains.items()]
-
-    def _redeclare_versions(self, catalog: Catalog) -> None:
-        """Go over to the chains of another catalog; what was given at start holds no more."""
-        dropped = self._catalog.chains.keys() - catalog.chains.keys()
-        self._catalog = catalog
-        self._declaring = True
-        for chain in dropped:
-            self._node.undeclare_parameter(version_parameter(chain))
-        for parameter in self._version_parameters():
-            descriptor = parameter.descriptor()
-            if self._node.has_parameter(parameter.name):
-                descriptor.type = ParameterType.PARAMETER_STRING
-                self._node.set_descriptor(parameter.name, descriptor)
-            else:
-                self._node.declare_parameter(parameter.name, parameter.default, descriptor,
-                                             ignore_override=True)
-        self._declaring = False
 
     def _check_overrides(self) -> None:
         """Refuse overrides that rclpy would pass over in silence: misspelt ones and bad QoS.
 
         A file for all nodes holds other nodes' parameters, too; that they are passed over is said.
         """
-        known = [*(parameter.name for parameter in _PARAMETERS),
-                 *map(version_parameter, self._catalog.chains), *_RCLPYS_OWN]
+        known = [*(parameter.name for parameter in _PARAMETERS), *_RCLPYS_OWN]
         resolve = self._node.resolve_topic_name
         roles = {resolve('joint_states'): 'subscription'}
         roles |= {resolve(f'~/{entry.tip}/{kind}'): 'publisher'
@@ -156,7 +131,7 @@ class NodeParameters:
             if name.startswith(PREFIX):
                 check_qos_override(name, override.value, roles)
             elif name not in known:
-                if name not in _COMMON_ELSEWHERE and (guess := near(name, known)):
+                if name not in _COMMON_ELSEWHERE and (guess := closest(name, known)):
                     raise ParameterError(
                         f'unknown parameter {name!r}; did you mean {guess!r}?')
                 foreign.append(name)
@@ -165,9 +140,7 @@ class NodeParameters:
                 f'passed over parameters that are not of this node: {", ".join(foreign)}')
 
     def _values(self) -> dict[str, Any]:
-        names = [*(parameter.name for parameter in _PARAMETERS),
-                 *map(version_parameter, self._catalog.chains)]
-        return {name: self._value(name) for name in names if self._node.has_parameter(name)}
+        return {parameter.name: self._value(parameter.name) for parameter in _PARAMETERS}
 
     def _value(self, name: str) -> Any:
         try:
@@ -181,17 +154,12 @@ class NodeParameters:
         if self._declaring:
             return SetParametersResult(successful=True)
         values = self._values()
-        ours = {change.name: change for change in changes if change.name in values
-                or change.name.endswith('.version')}
-        for name, change in ours.items():
-            values[name] = change.value
+        ours = [change for change in changes if change.name in values]
         if not ours:
             return SetParametersResult(successful=True)
+        values |= {change.name: change.value for change in ours}
         try:
-            catalog = self._catalog
-            if 'kinematics_file' in ours:
-                catalog = Catalog.load(values['kinematics_file'] or None)
-            self._candidate = catalog, Configuration.from_parameters(values, catalog)
+            self._candidate = _configuration(self._catalog, values)
         except LegFKError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
@@ -200,20 +168,17 @@ class NodeParameters:
         """Take over what `_check` has found valid."""
         if self._candidate is None:
             return
-        (catalog, self.configuration), self._candidate = self._candidate, None
-        if catalog is not self._catalog:
-            self._redeclare_versions(catalog)
+        self.configuration, self._candidate = self._candidate, None
         self._apply(self.configuration)
 
 
-def _with_typed_lists(changes: Sequence[Parameter]) -> list[Parameter]:
-    """Return the changes with an empty list of chains as one of strings.
-
-    An empty list says nothing of its type; rclpy sends it as bytes, ros2 param as booleans.
-    """
-    return [Parameter('chains', Parameter.Type.STRING_ARRAY, [])
-            if change.name == 'chains' and change.value in ([], b'') else change
-            for change in changes]
+def _configuration(catalog: Catalog, values: Mapping[str, Any]) -> Configuration:
+    """Return the configuration of parameter values by name."""
+    others = {name: value for name, value in values.items() if name != 'kinematics_file'}
+    if others['publish_tf'] and find_spec('tf2_msgs') is None:
+        raise ParameterError('publish_tf', 'found true without the Python module tf2_msgs; '
+                             'allowed: false, or install tf2_msgs, which ROS 2 has')
+    return Configuration.checked(catalog, **others)
 
 
 def _kind(parameter: _Parameter) -> str:

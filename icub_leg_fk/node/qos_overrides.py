@@ -31,15 +31,15 @@ def check_qos_override(name: str, value: Any, roles: Mapping[str, str]) -> None:
     entity, _, policy = name.removeprefix(PREFIX).rpartition('.')
     entities = [f'{topic}.{role}' for topic, role in roles.items()]
     if entity not in entities:
-        raise ParameterError(f'parameter {name}: no such topic, allowed: {PREFIX} with '
+        raise ParameterError(name, f'no such topic, allowed: {PREFIX} with '
                              f'{", ".join(entities)}')
     if policy == 'depth':
         if type(value) is not int or not 1 <= value <= _LARGEST_DEPTH:
-            raise ParameterError(f'parameter {name}: found {value!r}, '
+            raise ParameterError(name, f'found {value!r}, '
                                  f'allowed: an integer from 1 to {_LARGEST_DEPTH}')
     elif policy not in _CHOICES:
-        raise ParameterError(f'parameter {name}: no such policy, '
+        raise ParameterError(name, f'no such policy, '
                              f'allowed: depth, {", ".join(_CHOICES)}')
     elif value not in _CHOICES[policy]:
-        raise ParameterError(f'parameter {name}: found {value!r}, '
+        raise ParameterError(name, f'found {value!r}, '
                              f'allowed: {" or ".join(_CHOICES[policy])}')

@@ -1,13 +1,11 @@
 """Marker messages that draw a chain as a skeleton, for RViz and Foxglove."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
-from icub_leg_fk.stream.configuration import SOLE_OUTLINE
-import numpy as np
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -17,16 +15,14 @@ _BONE_COLOR = ColorRGBA(r=0.75, g=0.75, b=0.78, a=1.0)
 _JOINT_COLOR = ColorRGBA(r=0.0, g=0.45, b=0.70, a=1.0)
 _SOLE_COLOR = ColorRGBA(r=0.90, g=0.60, b=0.0, a=1.0)
 _SOLE_WIDTH = 0.006  # m
-_SOLE = np.hstack((SOLE_OUTLINE, np.ones((5, 1))))
 
 
-def skeleton_markers(chain: Chain, sole: Chain | None, q: Sequence[float], stamp: Time,
-                     frame_prefix: str) -> MarkerArray:
+def skeleton_markers(chain: Chain, q: Sequence[float], stamp: Time, frame_prefix: str
+                     ) -> MarkerArray:
     """Return a line through the origins of the chain's frames, a ball at each, and the sole.
 
     Args:
         chain: the chain.
-        sole: the chain down to its sole, whose outline is drawn; None if it has none.
         q: n joint positions [rad or m].
         stamp: stamp of the markers.
         frame_prefix: put before the root frame's id.
@@ -37,10 +33,11 @@ def skeleton_markers(chain: Chain, sole: Chain | None, q: Sequence[float], stamp
                      _JOINT_COLOR)
     bones.points = joints.points = points
     markers = [bones, joints]
-    if sole is not None:
+    corners = chain.sole_outline(q)
+    if corners is not None:
         outline = _marker(chain, stamp, frame_prefix, 2, Marker.LINE_STRIP, _SOLE_WIDTH,
                           _SOLE_COLOR)
-        outline.points = _points((_SOLE @ sole.forward(q).T)[:, :3])
+        outline.points = _points([*corners, corners[0]])
         markers.append(outline)
     return MarkerArray(markers=markers)
 
@@ -50,9 +47,9 @@ def no_skeletons() -> MarkerArray:
     return MarkerArray(markers=[Marker(action=Marker.DELETEALL)])
 
 
-def _points(positions: Array) -> list[Point]:
-    """Return the (N, 3) positions as messages."""
-    return [Point(x=x, y=y, z=z) for x, y, z in positions.tolist()]
+def _points(positions: Iterable[Array]) -> list[Point]:
+    """Return positions, (3,) each, as messages."""
+    return [Point(x=x, y=y, z=z) for x, y, z in (position.tolist() for position in positions)]
 
 
 def _marker(chain: Chain, stamp: Time, frame_prefix: str, number: int, kind: int, size: float,

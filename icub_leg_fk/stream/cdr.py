@@ -137,8 +137,8 @@ class _Reader:
     def __init__(self, data: bytes) -> None:
         byte_order = BYTE_ORDERS.get(bytes(data[:2]))
         if byte_order is None:
-            raise MalformedMessageError(f'JointState has the encapsulation 0x{data[:2].hex()}; '
-                                        'allowed: 0x0000, 0x0001')
+            raise MalformedMessageError('JointState', 'has the encapsulation '
+                                        f'0x{data[:2].hex()}; allowed: 0x0000, 0x0001')
         self.byte_order = byte_order
         self.padding: list[tuple[int, int]] = []
         self._data = data
@@ -157,7 +157,7 @@ class _Reader:
         start = self._at
         self._at = start + size
         if self._at > len(self._data):
-            raise MalformedMessageError(f'JointState: {field} ends at byte {self._at}; allowed: '
+            raise MalformedMessageError('JointState', f'{field} ends at byte {self._at}; allowed: '
                                         f'{len(self._data)}')
         return start
 
@@ -168,7 +168,7 @@ class _Reader:
                                         self.take(field, 4))[0]
         left = len(self._data) - self._at
         if count * item_size > left:
-            raise MalformedMessageError(f'JointState: {field} has {count} items; allowed: what '
+            raise MalformedMessageError('JointState', f'{field} has {count} items; allowed: what '
                                         f'fits in the {left} bytes left')
         return count
 
@@ -178,7 +178,7 @@ class _Reader:
         start = self.take(field, size)
         text = self._data[start:self._at]
         if size and text.find(0) != size - 1:
-            raise MalformedMessageError(f'JointState: {field} is not a string that ends with NUL')
+            raise MalformedMessageError('JointState', f'{field} is not a string that ends with NUL')
         return text[:-1].decode('utf-8', 'replace')
 
     def doubles(self, field: str) -> Doubles:

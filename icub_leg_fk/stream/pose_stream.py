@@ -34,7 +34,7 @@ class PoseStream:
 
     def __init__(self, chains: Sequence[Chain], frame_prefix: str, senders: Sequence[Senders],
                  send_tf: Send | None, no_velocity: Callable[[int], None]) -> None:
-        self._frames = [(frame_prefix + chain.root_frame, frame_prefix + chain.tip_frame)
+        self._frames = [(frame_prefix + chain.root_frame, frame_prefix + chain.frame_id)
                         for chain in chains]
         self._outputs = [
             (chain, *send, PoseStampedEncoder(root).encode, TwistStampedEncoder(root).encode)

@@ -5,20 +5,24 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 import re
 import sqlite3
 import time
 from typing import Any
 
-from icub_leg_fk.errors import InputFileError, LegFKError, OutputFileError
+from icub_leg_fk.errors import InputFileError, LegFKError, OutputFileError, ParameterError
 from icub_leg_fk.kinematics import Catalog
-from icub_leg_fk.stream.configuration import Configuration, version_parameter
+from icub_leg_fk.stream.configuration import (
+    Configuration,
+    DEFAULT_FRAME,
+    DEFAULT_TIMEOUT,
+    LEGS,
+)
 from icub_leg_fk.stream.joint_input import JointInput
 from icub_leg_fk.stream.pose_stream import PoseStream, Send, Senders
 from icub_leg_fk.tools.bags import import_rosbags, joint_connections, messages, open_bag
-from icub_leg_fk.tools.options import DEFAULT_VERSION, LEGS
 from icub_leg_fk.tools.output_file import check_target, is_bag, whole_path
 
 NODE = '/foot_pose_publisher'
@@ -49,9 +53,9 @@ class Summary:
 
 def add_foot_poses(
         source: str | Path, target: str | Path, *, chains: Sequence[str] = LEGS,
-        version: str = DEFAULT_VERSION, chain_versions: Mapping[str, str] | None = None,
-        kinematics_file: str | None = None, foot_frame: str = 'dh', frame_prefix: str = '',
-        joint_timeout: float = 0.5, joint_topic: str | None = None, twist: bool = False,
+        version: str = '', kinematics_file: str | None = None, foot_frame: str = DEFAULT_FRAME,
+        frame_prefix: str = '', joint_timeout: float = DEFAULT_TIMEOUT,
+        joint_topic: str | None = None, twist: bool = False,
         tf: bool = False, only_poses: bool = False, replace_poses: bool = False,
         storage: str = '', force: bool = False, progress: Callable[[float], None] | None = None
         ) -> Summary:
@@ -60,9 +64,8 @@ def add_foot_poses(
     Args:
         source: directory of a rosbag2 recording, or a .mcap or .db3 file.
         target: directory to make, or a file if its name ends in .mcap or .db3.
-        chains: chains of the kinematics file.
-        version: version of every chain that has none of its own.
-        chain_versions: versions of single chains, by name.
+        chains: chains of the kinematics file, such as `left_leg` or `head_imu=v2`.
+        version: version of every chain that is named without one; empty is its default.
         kinematics_file: path of a kinematics file; the shipped one if None.
         foot_frame: a tip frame's name.
         frame_prefix: put before every frame id.
@@ -83,16 +86,14 @@ def add_foot_poses(
     """
     began = time.monotonic()
     source, target = Path(source), Path(target)
-    parameters = {
-        'chains': list(chains), 'version': version, 'foot_frame': foot_frame,
-        'frame_prefix': frame_prefix, 'joint_timeout': joint_timeout, 'stamp_source': 'message',
-        'publish_tf': False, 'publish_twist': twist, 'publish_markers': False}
-    parameters |= {version_parameter(chain): own for chain, own in (chain_versions or {}).items()}
     try:
-        configuration = Configuration.from_parameters(parameters, Catalog.load(kinematics_file))
-    except LegFKError as error:
-        raise LegFKError(_as_options(str(error))) from error
-    configuration = replace(configuration, publish_tf=tf)  # which needs no tf2_msgs here
+        configuration = Configuration.checked(
+            Catalog.load(kinematics_file), chains=chains, version=version, foot_frame=foot_frame,
+            frame_prefix=frame_prefix, joint_timeout=joint_timeout, publish_tf=tf,
+            publish_twist=twist)
+    except ParameterError as error:
+        option = error.parameter.replace('_', '-')
+        raise LegFKError(f'--{option}: {error.fault}') from error
     storage = _checked(source, target, storage)
     check_target(target, force=force, may_replace=is_bag)
     with open_bag(source) as reader:
@@ -138,7 +139,7 @@ class _Job:
         self._time = self._copied = 0
         self._input = JointInput(configuration.chains, configuration.joint_timeout,
                                  lambda: self._time, velocities=configuration.publish_twist)
-        self._children = [configuration.frame_prefix + chain.tip_frame
+        self._children = [configuration.frame_prefix + chain.frame_id
                           for chain in configuration.chains]
         self._notes = [*configuration.notes, *configuration.warnings]
         self._topics: dict[str, str] = {}  # what is added: types by topic
@@ -285,13 +286,6 @@ def _reliable(depth: int) -> Any:
         interfaces.QosHistory.KEEP_LAST, depth, interfaces.QosReliability.RELIABLE,
         interfaces.QosDurability.VOLATILE, forever, forever, interfaces.QosLiveliness.AUTOMATIC,
         forever, False)
-
-
-def _as_options(text: str) -> str:
-    """Return a text on parameters of the node as one on options of the command."""
-    text = re.sub(r'^parameter (\w+)\.version', r'--chain-version \1', text)
-    text = re.sub(r'^parameter (\w+)', lambda match: '--' + match[1].replace('_', '-'), text)
-    return re.sub(r'\(or set (\w+)\.version\)', r'(or --chain-version \1=VERSION)', text)
 
 
 def _checked(source: Path, target: Path, storage: str) -> str:

@@ -5,7 +5,7 @@ matplotlib takes nothing from the user's settings, and pyplot, which wants a dis
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 import logging
 import math
@@ -16,7 +16,6 @@ from typing import Any, TYPE_CHECKING
 from icub_leg_fk.errors import LegFKError, MissingDependencyError, OutputFileError
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
-from icub_leg_fk.stream.configuration import SOLE_OUTLINE
 from icub_leg_fk.tools.output_file import check_target, whole_path
 from icub_leg_fk.tools.recording import ChainTrack, time_span
 import numpy as np
@@ -87,11 +86,10 @@ def save_picture(draw: Callable[[], Figure], path: Path, *, force: bool, dpi: in
         raise LegFKError(f'{path}: cannot be drawn: {error}') from error
 
 
-def feet_figure(tracks: Sequence[ChainTrack], instants: Sequence[float], title: str,
-                soles: Mapping[str, Chain]) -> Figure:
+def feet_figure(tracks: Sequence[ChainTrack], instants: Sequence[float], title: str
+                ) -> Figure:
     """Return the tips over time, and beside them the chains in space at up to four instants [s].
 
-    The outline of a foot is drawn where `soles` has the same chain down to its sole, by name.
     """
     from matplotlib.figure import Figure
 
@@ -116,11 +114,11 @@ def feet_figure(tracks: Sequence[ChainTrack], instants: Sequence[float], title: 
                         for scene in scenes for track, i in scene])
     for i, (scene, instant) in enumerate(zip(scenes, instants)):
         space = Space(figure, spaces[i], points)
-        _draw_scene(space, scene, soles)
+        _draw_scene(space, scene)
         space.axes.text2D(0.06, 0.95, f'{"ABCD"[i]}  {instant:.2f} s', weight='bold',
                           transform=space.axes.transAxes)
     frames = ', '.join(dict.fromkeys(
-        [tracks[0].chain.root_frame, *(track.chain.tip_frame for track in tracks)]))
+        [tracks[0].chain.root_frame, *(track.chain.frame_id for track in tracks)]))
     figure.text(0.03, 1 - 0.35 / height, title, fontsize=19, weight='bold', va='center')
     for x, side, words in ((0.03, 'left', _notes(tracks, bool(rows))),
                            (0.985, 'right', f'axes of {frames};  squares of {space.step:g} m')):
@@ -217,22 +215,21 @@ class Space:
                            color=AXIS_COLORS[i], weight='bold', va='center', zorder=zorder + 1,
                            ha='center' if abs(aside) < 0.3 else 'left' if aside > 0 else 'right')
 
-    def chain(self, chain: Chain, q: ArrayLike, sole: Chain | None, zorder: float) -> None:
+    def chain(self, chain: Chain, q: ArrayLike, zorder: float) -> None:
         """Draw a chain's skeleton from the root to its tip, its joints, and its sole if any."""
         points, color = chain.frames(q)[:, :3, 3], color_of(chain)
         self.line([(0.0, 0.0, 0.0), points[0]], color=FAINT, linewidth=2.5, zorder=zorder,
                   linestyle=(0, (2, 1.2)))
-        if sole is not None:
-            corners = sole.forward(q) @ np.vstack((np.transpose(SOLE_OUTLINE), np.ones(5)))
-            self.fill(corners[:3].T, color, zorder, 0.3)
+        corners = chain.sole_outline(q)
+        if corners is not None:
+            self.fill(corners, color, zorder, 0.3)
         self.line(points, color='white', linewidth=8, zorder=zorder + 1)
         self.line(points, color=color, linewidth=4, zorder=zorder + 2, solid_joinstyle='round')
         self.line(points[:-1], color=color, linestyle='', marker='o', markersize=6.5,
                   markerfacecolor='white', markeredgewidth=1.8, zorder=zorder + 3)
 
 
-def _draw_scene(space: Space, scene: Sequence[tuple[ChainTrack, int]],
-                soles: Mapping[str, Chain]) -> None:
+def _draw_scene(space: Space, scene: Sequence[tuple[ChainTrack, int]]) -> None:
     space.frame(np.eye(4), 1.2 * space.step, 90)
     nearest_last = sorted(scene, key=lambda sample: space.depth(
         sample[0].chain.frames(sample[0].positions[sample[1]])[:, :3, 3]))
@@ -241,7 +238,7 @@ def _draw_scene(space: Space, scene: Sequence[tuple[ChainTrack, int]],
         around = np.abs(track.times - track.times[i]) <= _TRAIL
         space.line(track.poses[around, :3], color=color_of(chain), linewidth=1, alpha=0.5,
                    zorder=zorder)
-        space.chain(chain, q, soles.get(chain.name), zorder)
+        space.chain(chain, q, zorder)
         space.frame(chain.forward(q), space.step, zorder + 5, 1.8, size=8)
 
 

@@ -8,7 +8,7 @@ parallel axes: Rz(theta_3) Rx(pi) Rz(theta_4) is Rz(theta_3 - theta_4) Rx(pi). S
 added up while multiplying, and appear as c_34 and s_34, or c_3m4 and s_3m4 for a difference.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import reduce
@@ -18,8 +18,6 @@ from typing import Any
 
 from icub_leg_fk.errors import MissingDependencyError
 from icub_leg_fk.kinematics import Chain
-from icub_leg_fk.kinematics.catalog import ChainVersion
-from icub_leg_fk.kinematics.chain import modified_rows
 from icub_leg_fk.kinematics.link import DHLink
 from icub_leg_fk.kinematics.rotation import Array, cos_sin
 import numpy as np
@@ -113,7 +111,7 @@ class _Algebra:
             return theta, d
         position = (self._sympy.Symbol(f'q_{index}') if q is None
                     else self.mm(q) if link.is_prismatic else self.angle(q))
-        moved = link.sign * position + (d if link.is_prismatic else theta)
+        moved = self.number(link.gain) * position + (d if link.is_prismatic else theta)
         if q is None:
             moved = self._define(f'{"d" if link.is_prismatic else "theta"}_{index}', moved)
         return (theta, moved) if link.is_prismatic else (moved, d)
@@ -185,19 +183,18 @@ class _Algebra:
         return self._sympy.Symbol(name)
 
 
-def work_out(version: ChainVersion, chain: Chain, foot_frame: str | None,
-             q: Sequence[float] | None, exact: bool) -> Explanation:
+def work_out(chain: Chain, q: Sequence[float] | None, exact: bool) -> Explanation:
     """Work a chain out for a joint vector [rad or m], or for symbols, which are exact."""
     algebra, decimals = _Algebra(exact or q is None), _Algebra(False)
     steps = _steps(chain, q, algebra)
     products = algebra.running_products(steps, chain.convention == 'modified')
     tip, sole = _TIP_SYMBOLS.get(chain.tip, ('E', 'S'))
     tips = []
-    if not np.array_equal(version.T_n_tip, np.eye(4)):
-        tips.append((f'T_n{tip}', version.T_n_tip))
-    T_dh_tip = version.tip_frames[foot_frame or next(iter(version.tip_frames))].T_dh_tip
-    if not np.array_equal(T_dh_tip, np.eye(4)):
-        tips.append((f'T_{tip}{sole}', T_dh_tip))
+    if not np.array_equal(chain.T_n_tip, np.eye(4)):
+        tips.append((f'T_n{tip}', chain.T_n_tip))
+    T_tip_frame = chain.tip_frames[chain.frame].T_tip_frame
+    if not np.array_equal(T_tip_frame, np.eye(4)):
+        tips.append((f'T_{tip}{sole}', T_tip_frame))
         tip = sole
     T: Array = np.array(_constant(chain.T_root_0, decimals))
     frames = {'0': T}
@@ -208,7 +205,7 @@ def work_out(version: ChainVersion, chain: Chain, foot_frame: str | None,
     T_root_0 = _constant(chain.T_root_0, algebra)
     exact_tips = [(name, _constant(placed, algebra)) for name, placed in tips]
     T_root_tip = product(T_root_0, products[-1], *(placed for _, placed in exact_tips))
-    return Explanation(chain, tip, version.source, q, T_root_0, steps, products, exact_tips,
+    return Explanation(chain, tip, chain.source, q, T_root_0, steps, products, exact_tips,
                        T_root_tip, frames, algebra.symbols)
 
 
@@ -225,12 +222,10 @@ def _constant(T: Array, algebra: _Algebra) -> Matrix:
 
 
 def _steps(chain: Chain, q: Sequence[float] | None, algebra: _Algebra) -> list[Step]:
-    names = iter(chain.joint_names)
-    given: Iterator[float | None] = iter([None] * chain.n if q is None else q)
     modified = chain.convention == 'modified'
     steps = []
-    for i, link in enumerate(modified_rows(chain) if modified else chain.links):
-        joint, position = ('', 0.0) if link.is_fixed else (next(names), next(given))
+    for i, (link, joint, joint_index, _) in enumerate(chain.rows()):
+        position = None if q is None or link.is_fixed else q[joint_index]
         theta, d = algebra.joint(i, link, position)
         a, alpha = algebra.mm(link.a), algebra.angle(link.alpha)
         (ct, st), (ca, sa) = algebra.cos_sin(i, theta), algebra.cos_sin_constant(alpha)

@@ -13,25 +13,15 @@ from icub_leg_fk.errors import JointVectorError, LegFKError
 if TYPE_CHECKING:
     from icub_leg_fk.kinematics import Catalog, Chain
 
-LEGS = ('left_leg', 'right_leg')
-DEFAULT_VERSION = 'v2_5'
 LARGEST = 1e9  # of a joint position; beyond it a float's last turn is lost anyway
 
 
-def _chain_version(text: str) -> tuple[str, str]:
-    chain, _, version = text.strip().partition('=')
-    if not (chain and version):
-        raise argparse.ArgumentTypeError(f'found {text.strip()!r}, allowed: CHAIN=VERSION')
-    return chain, version
-
-
 _OPTIONS: dict[str, dict[str, Any]] = {
-    'chain': {'metavar': 'CHAIN', 'help': 'a chain, such as left_leg (leg_fk list shows them)'},
-    '--chains': {'metavar': 'CHAIN', 'nargs': '+', 'help': 'chains (default: both legs)'},
-    '--version': {'metavar': 'VERSION', 'help': f'of the tables (default: {DEFAULT_VERSION})'},
-    '--chain-version': {'metavar': 'CHAIN=VERSION', 'action': 'append', 'default': [],
-                        'type': _chain_version,
-                        'help': 'version of one chain; may stand several times'},
+    'chain': {'metavar': 'CHAIN', 'help': 'a chain, such as left_leg or left_leg=v1 (leg_fk list shows '
+              'them)'},
+    '--chains': {'metavar': 'CHAIN', 'nargs': '+', 'help': 'chains, such as left_leg or head_imu=v2 (default: both '
+                 'legs)'},
+    '--version': {'metavar': 'VERSION', 'help': "of the tables (default: the file's)"},
     '--foot-frame': {'metavar': 'FRAME',
                      'help': "axes of the tip: of the iCub's feet dh, the table's last frame (the "
                              'default), or sole, x forward, y left, z up'},
@@ -98,26 +88,6 @@ _joint_position = number_between(-LARGEST, LARGEST, f'finite numbers up to {LARG
                                  'joint')
 
 
-def own_versions(args: argparse.Namespace, chains: Sequence[str]) -> dict[str, str]:
-    """Return the versions given by `--chain-version`, for chains that may have one."""
-    versions: dict[str, str] = {}
-    for chain, version in args.chain_version:
-        if chain not in chains or chain in versions:
-            raise LegFKError(f'--chain-version: found {chain}{" again" * (chain in versions)}, '
-                             f'allowed: {", ".join(chains)}, each once')
-        versions[chain] = version
-    return versions
-
-
-def chosen_version(catalog: Catalog, chain: str, version: str | None) -> str:
-    """Return the version asked for, or else the default one if the chain has that."""
-    versions = catalog.entry(chain).versions
-    if version is None and DEFAULT_VERSION not in versions:
-        raise LegFKError(f'chain {chain} has no version {DEFAULT_VERSION}, the default: give '
-                         f'--version; known: {", ".join(versions)}')
-    return DEFAULT_VERSION if version is None else version
-
-
 def load_catalog(args: argparse.Namespace) -> Catalog:
     """Return the catalog that `-k` names; what it warns of is said on stderr."""
     from icub_leg_fk.kinematics import Catalog
@@ -131,8 +101,7 @@ def load_catalog(args: argparse.Namespace) -> Catalog:
 def load_chain(args: argparse.Namespace) -> tuple[Catalog, Chain]:
     """Return the catalog, and the chain that its options name."""
     catalog = load_catalog(args)
-    version = chosen_version(catalog, args.chain, args.version)
-    return catalog, catalog.chain(args.chain, version, args.foot_frame)
+    return catalog, catalog.chain(args.chain, args.version, args.foot_frame)
 
 
 def joint_positions(args: argparse.Namespace, chain: Chain) -> list[float] | None:
@@ -141,7 +110,7 @@ def joint_positions(args: argparse.Namespace, chain: Chain) -> list[float] | Non
     if given is None:
         return None
     if len(given) != chain.n:
-        raise JointVectorError(f'joint positions: found {len(given)}, allowed: {chain.n}, in the '
-                               f'order {" ".join(chain.joint_names)}')
+        raise JointVectorError('joint positions', f'are {len(given)}', f'{chain.n}, in the order '
+                               f'{" ".join(chain.joint_names)}')
     return [value if args.degrees is None or link.is_prismatic else math.radians(value)
             for value, link in zip(given, chain.joints, strict=True)]

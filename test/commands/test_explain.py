@@ -22,7 +22,7 @@ def test_the_answer_is_the_chains_pose(words, chain):
     e = json.loads(explain(*words, '--json', '--radians', *q))
     assert np.abs(in_metres(e['T_root_tip']) - chain.forward(q)).max() < 1e-12
     assert (e['chain'], e['version']) == (chain.name, chain.version)
-    assert (e['root_frame'], e['tip_frame']) == (chain.root_frame, chain.tip_frame)
+    assert (e['root_frame'], e['frame_id']) == (chain.root_frame, chain.frame_id)
 
 
 @every_chain

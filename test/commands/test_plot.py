@@ -47,7 +47,7 @@ def tracks(gait):
 
 def write_bag(path, messages, **options):
     """Write messages (stamp [s], names, positions), skipping the test without rosbags."""
-    import bag_files
+    from support import bag_files
     joints = [(round(stamp * 1e9), bag_files.joint_state(round(stamp * 1e9), names, positions))
               for stamp, names, positions in messages]
     return bag_files.write_bag(path, joints=joints, others=False, **options)

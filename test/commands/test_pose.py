@@ -36,7 +36,7 @@ def test_the_golden_pose_at_zero(words, position):
 
 def test_json_has_exactly_the_documented_keys():
     answer = pose('left_leg', '--degrees', *ZEROS)
-    assert list(answer) == ['chain', 'version', 'root_frame', 'tip_frame', 'position',
+    assert list(answer) == ['chain', 'version', 'root_frame', 'frame_id', 'position',
                             'quaternion', 'matrix']
     assert [answer[key] for key in list(answer)[:4]] == [
         'left_leg', 'v2_5', 'root_link', 'l_foot_dh_frame']
@@ -65,7 +65,7 @@ def test_every_way_to_write_a_negative_number_is_read():
 
 def test_the_sole_is_level_and_faces_forward_at_zero():
     answer = pose('left_leg', '--degrees', *ZEROS, '--foot-frame', 'sole')
-    assert answer['tip_frame'] == 'l_sole'
+    assert answer['frame_id'] == 'l_sole'
     # root_link has x backward, the sole x forward; both have z up.
     assert np.allclose(np.array(answer['matrix'])[:3, :3], np.diag([-1, -1, 1]))
 

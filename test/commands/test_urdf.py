@@ -55,8 +55,8 @@ def largest_difference(urdf, chain, configurations=1000):
     pin = pytest.importorskip('pinocchio')
     model = pin.buildModelFromXML(urdf)
     data = model.createData()
-    frame = model.getFrameId(chain.tip_frame)
-    assert frame < model.nframes, f'no frame {chain.tip_frame}'
+    frame = model.getFrameId(chain.frame_id)
+    assert frame < model.nframes, f'no frame {chain.frame_id}'
     Q = np.random.default_rng(7).uniform(-3, 3, (configurations, chain.n))
     worst = 0.0
     for q in Q:

@@ -17,7 +17,7 @@ ANGLES = st.one_of(
 
 def links(joint_types: Sequence[str]) -> st.SearchStrategy[DHLink]:
     return st.builds(DHLink, a=LENGTHS, d=LENGTHS, alpha=ANGLES, offset=ANGLES,
-                     joint_type=st.sampled_from(joint_types), sign=st.sampled_from([1, 1, -1]))
+                     joint_type=st.sampled_from(joint_types), gain=st.sampled_from([1, 1, -1, 0.5, -2.0]))
 
 
 LINKS = links(['revolute', 'revolute', 'prismatic', 'fixed'])
@@ -38,7 +38,7 @@ def chain_of(links: Sequence[DHLink], T_root_0: np.ndarray | None = None,
              T_n_tip: np.ndarray | None = None) -> Chain:
     joints = [i for i, link in enumerate(links) if link.joint_type != 'fixed']
     return Chain(
-        name='any', version='', root_frame='root', tip='tip', tip_frame='tip',
+        name='any', version='', root_frame='root', tip='tip',
         joint_names=tuple(f'joint_{i}' for i in joints), links=tuple(links),
         T_root_0=np.eye(4) if T_root_0 is None else T_root_0,
         T_n_tip=np.eye(4) if T_n_tip is None else T_n_tip)
