@@ -49,7 +49,7 @@ class Trial:
         self.input.configure(chains, timeout / SECOND, velocities=True)
 
     def send(self, message, data=None):
-        """Send a message, in other bytes than its own if given; return how many chains it gives."""
+        """Send a message, in other bytes than its own if given; return the number of vectors."""
         sec, nanosec = message.sec, message.nanosec
         if sec == 0 and nanosec == 0:
             sec, nanosec = divmod(self.now, SECOND)
@@ -67,7 +67,7 @@ class Trial:
         return len(found)
 
     def send_bytes(self, data):
-        """Send bytes that may be anything, and return how many chains they give."""
+        """Send bytes that may be anything, and return the number of vectors."""
         try:
             message = decode_joint_state(data)
         except MalformedMessageError:
