@@ -137,6 +137,8 @@ class Form:
         Fast CDR leaves in it what was in its buffer before; the next message of the same publisher
         likely has the same.
         """
+        if len(data) < self._size:
+            return False
         head = data[STAMP_END:self.names_end]
         if int.from_bytes(head, 'little') & self._mask != self._masked_head:
             return False

@@ -163,6 +163,14 @@ def test_equal_bytes_in_another_order_are_told_apart(robot):
     assert robot.take_look().rejected == {'malformed': 1}
 
 
+def test_a_message_cut_short_does_not_blur_what_is_remembered_of_others(robot):
+    data = Message(1, 0, ('turn', 'lift', 'reach', 'tilt'), (0.1, 0.2, 0.3, 0.4)).cdr()
+    robot.feed(data[:20] + bytes(4) + data[24:])  # no names, and their text as numbers
+    robot.feed(data[:13])
+    robot.feed(data)
+    assert robot.take_look().rejected == {'position_length': 1, 'malformed': 1}
+
+
 def test_a_look_has_the_names_that_came_of_every_publisher(robot):
     robot.send(0, ['L_KNEE', 'icub/l_knee'])
     robot.send(1, ['wheel', 'l_knee'], [])

@@ -49,7 +49,7 @@ def messages(draw):
 def test_any_sequence_gives_the_poses_that_the_rules_give():
     sent = ready = 0
 
-    @settings(max_examples=300)
+    @settings(max_examples=200)
     @given(messages(), TIMEOUTS, st.integers(1, 60))
     def run(given_messages, timeout, period):
         nonlocal sent, ready
@@ -70,7 +70,7 @@ def test_any_sequence_gives_the_poses_that_the_rules_give():
 def test_spoilt_messages_are_refused_or_give_what_their_bytes_say():
     sent = ready = 0
 
-    @settings(max_examples=300)
+    @settings(max_examples=200)
     @given(messages(), st.lists(SPOILS, min_size=1, max_size=60))
     def run(given_messages, spoils):
         nonlocal sent, ready

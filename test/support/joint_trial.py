@@ -165,7 +165,7 @@ def steps(faults):
         value=st.sampled_from(SPECIAL),
         shift=st.sampled_from((0, 1, 10**6, SECOND // 2, SECOND // 2 + 1, 3 * SECOND, 10**19)),
         padding=st.sampled_from((0, 0, 255)))
-    return st.lists(step, max_size=60)
+    return st.lists(step, min_size=10, max_size=60)
 
 
 STARTS = st.sampled_from((0, 7, 1_700_000_000, -3, 2**31 - 20))  # s
