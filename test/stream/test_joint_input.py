@@ -98,6 +98,19 @@ def test_a_looping_bag_goes_on_with_the_very_message(robot):
     assert look.faults == {'time_jump': '1700000000.000 s'}
 
 
+@pytest.mark.parametrize(('stamps', 'steps'), [
+    ((0, 10, 0), 0), ((1, 10, 0), 1), ((None, 500, 0), 0), ((None, 501, 0), 1)])
+def test_time_has_stepped_back_from_what_is_held_of_a_joint_or_from_all_by_the_timeout(
+        robot, stamps, steps):
+    before, other, now = stamps
+    if before is not None:
+        robot.send(before, LEFT)
+    robot.send(other, RIGHT)
+    assert robot.ready(now, LEFT) == ['left_leg']
+    assert robot.take_look().rejected['time_jump'] == steps
+    assert len(robot.held_stamps(LEGS[1])) == 6 * (1 - steps)
+
+
 def test_a_message_without_stamp_is_stamped_now(robot):
     [vector] = robot.feed(Message(0, 0, LEFT, (0.0,) * 6).cdr())
     assert vector.stamp == START
