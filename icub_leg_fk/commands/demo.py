@@ -11,15 +11,16 @@ from pathlib import Path
 import shutil
 import sys
 
+from icub_leg_fk.commands.plot import default_instants
 from icub_leg_fk.kinematics import Catalog, Chain, config_file
-from icub_leg_fk.tools import options, replay as replays
+from icub_leg_fk.tools import options
 from icub_leg_fk.tools import recording as recordings
+from icub_leg_fk.tools import replay as replays
 from icub_leg_fk.tools.bags import import_rosbags
-from icub_leg_fk.tools.replay import Answers, Replay
 from icub_leg_fk.tools.drawing import check_output, feet_figure, save_picture
 from icub_leg_fk.tools.output_file import check_target, is_bag
-from icub_leg_fk.commands.plot import default_instants
 from icub_leg_fk.tools.recording import JointRecording
+from icub_leg_fk.tools.replay import Answers, Replay
 import numpy as np
 
 EXAMPLES = """\

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 from icub_leg_fk.errors import LegFKError, near, ParameterError
 from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.node.qos_overrides import check_qos_override, PREFIX
 from icub_leg_fk.stream.configuration import (
     Configuration,
     DEFAULT_TIMEOUT,
@@ -12,7 +13,6 @@ from icub_leg_fk.stream.configuration import (
     STAMP_SOURCES,
     version_parameter,
 )
-from icub_leg_fk.node.qos_overrides import check_qos_override, PREFIX
 from rcl_interfaces.msg import (
     FloatingPointRange,
     ParameterDescriptor,

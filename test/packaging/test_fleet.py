@@ -4,8 +4,8 @@ from pathlib import Path
 import subprocess
 import sys
 
-from support.bag_files import LEFT_POSE, poses_of, read_bag, walk, write_bag
 import pytest
+from support.bag_files import LEFT_POSE, poses_of, read_bag, walk, write_bag
 
 SCRIPT = Path(__file__).resolve().parents[2] / 'docs' / 'fleet.py'
 
