@@ -237,5 +237,6 @@ def test_package_xml_is_valid_and_says_what_setup_py_says() -> None:
 
 
 def test_the_changelog_has_an_entry_for_this_version() -> None:
-    changelog = (ROOT / 'CHANGELOG.rst').read_text()
-    assert f'\n{icub_leg_fk.__version__} (' in changelog
+    catkin_changelog = pytest.importorskip('catkin_pkg.changelog')
+    changelog = catkin_changelog.get_changelog_from_path(ROOT)
+    assert changelog.get_content_of_version(icub_leg_fk.__version__)
