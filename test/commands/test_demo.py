@@ -14,12 +14,12 @@ import sys
 import termios
 import time
 
-from support.gait import walk
-from icub_leg_fk.kinematics import Catalog
-from icub_leg_fk.commands.demo import conclude
 from icub_leg_fk.__main__ import main
+from icub_leg_fk.commands.demo import conclude
+from icub_leg_fk.kinematics import Catalog
 import numpy as np
 import pytest
+from support.gait import walk
 
 pytest.importorskip('matplotlib')
 pytest.importorskip('rclpy', reason='needs ROS 2')

@@ -3,8 +3,8 @@
 import json
 from pathlib import Path
 
-from support.leg_fk_process import assert_one_line_complaint, leg_fk
 import pytest
+from support.leg_fk_process import assert_one_line_complaint, leg_fk
 
 ARM = Path(__file__).parents[2] / 'config' / 'examples' / 'cylindrical_arm.yaml'
 

@@ -8,10 +8,10 @@ import subprocess
 import sys
 
 import icub_leg_fk
-from icub_leg_fk.kinematics.catalog import config_file
 from icub_leg_fk.__main__ import COMMANDS
-from support.leg_fk_process import assert_one_line_complaint, COMMAND, leg_fk
+from icub_leg_fk.kinematics.catalog import config_file
 import pytest
+from support.leg_fk_process import assert_one_line_complaint, COMMAND, leg_fk
 
 
 def test_help_lists_every_command_with_one_line_and_examples():

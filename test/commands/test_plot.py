@@ -7,14 +7,14 @@ import sys
 from xml.etree import ElementTree
 import zlib
 
-from support.gait import walk
-from icub_leg_fk.kinematics import Catalog
 from icub_leg_fk.__main__ import main
 from icub_leg_fk.commands.plot import default_instants
+from icub_leg_fk.kinematics import Catalog
 from icub_leg_fk.tools.recording import ChainTrack
-from support.leg_fk_process import assert_one_line_complaint, leg_fk
 import numpy as np
 import pytest
+from support.gait import walk
+from support.leg_fk_process import assert_one_line_complaint, leg_fk
 
 pytest.importorskip('matplotlib')
 drawing = pytest.importorskip('icub_leg_fk.tools.drawing')

@@ -5,9 +5,9 @@ import math
 from pathlib import Path
 
 from icub_leg_fk import load_chain
-from support.leg_fk_process import assert_one_line_complaint, leg_fk
 import numpy as np
 import pytest
+from support.leg_fk_process import assert_one_line_complaint, leg_fk
 
 EXAMPLES = Path(__file__).parents[2] / 'config' / 'examples'
 ARM = ['arm', '-k', EXAMPLES / 'cylindrical_arm.yaml', '--version', 'v1']

@@ -5,12 +5,12 @@ from pathlib import Path
 import re
 from xml.etree import ElementTree as ET
 
-from icub_leg_fk.kinematics import Catalog
 from icub_leg_fk.__main__ import main
 from icub_leg_fk.commands.urdf import xyz_rpy
-from support.leg_fk_process import assert_one_line_complaint, leg_fk
+from icub_leg_fk.kinematics import Catalog
 import numpy as np
 import pytest
+from support.leg_fk_process import assert_one_line_complaint, leg_fk
 
 EXAMPLES = Path(__file__).parents[2] / 'config' / 'examples'
 ARM, UR5 = EXAMPLES / 'cylindrical_arm.yaml', EXAMPLES / 'ur5.yaml'

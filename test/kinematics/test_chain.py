@@ -6,14 +6,14 @@ import pickle
 import tracemalloc
 from typing import Any
 
-from support.any_chain import chain_of, CHAINS, chains_and_positions
 from hypothesis import given
 from hypothesis import strategies as st
 from icub_leg_fk.errors import JointVectorError, LegFKError
 from icub_leg_fk.kinematics import Catalog, Chain, DHLink
 import numpy as np
-from support.oracle import product, quaternion_to_matrix
 import pytest
+from support.any_chain import chain_of, CHAINS, chains_and_positions
+from support.oracle import product, quaternion_to_matrix
 
 
 @given(chains_and_positions())

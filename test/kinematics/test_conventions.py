@@ -3,10 +3,10 @@
 from pathlib import Path
 from typing import Any
 
+from icub_leg_fk.__main__ import main
 from icub_leg_fk.errors import CatalogError
 from icub_leg_fk.kinematics import Catalog, load_chain
 from icub_leg_fk.kinematics.chain import modified_rows
-from icub_leg_fk.__main__ import main
 import numpy as np
 import pytest
 

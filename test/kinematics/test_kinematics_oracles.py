@@ -4,8 +4,8 @@ from typing import Any
 
 from icub_leg_fk.kinematics import Catalog
 import numpy as np
-from support.oracle import CASES, HandMadeArm, KDLArm, PinocchioArm, quaternion_to_matrix, TABLES
 import pytest
+from support.oracle import CASES, HandMadeArm, KDLArm, PinocchioArm, quaternion_to_matrix, TABLES
 
 CONFIGURATIONS = 1000
 TOLERANCE = 1e-12

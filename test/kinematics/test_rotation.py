@@ -11,8 +11,8 @@ from icub_leg_fk.kinematics.rotation import (
     nearest_rotation,
 )
 import numpy as np
-from support.oracle import quaternion_to_matrix
 import pytest
+from support.oracle import quaternion_to_matrix
 
 EPS = np.finfo(float).eps
 COMPONENT = st.one_of(

@@ -5,8 +5,8 @@ import tracemalloc
 
 from icub_leg_fk.kinematics import Catalog
 from icub_leg_fk.stream.joint_input import JointInput
-from support.joint_model import Message
 import pytest
+from support.joint_model import Message
 
 LEFT, RIGHT = 0, 1
 MS = 1_000_000  # ns
