@@ -41,6 +41,9 @@ class Pose(NamedTuple):
     qz: float
     qw: float
 
+    def __repr__(self) -> str:
+        return _short_repr(self)
+
 
 class Twist(NamedTuple):
     """Linear [m/s] and angular [rad/s] velocity of a tip in the axes of its root frame."""
@@ -51,6 +54,9 @@ class Twist(NamedTuple):
     wx: float
     wy: float
     wz: float
+
+    def __repr__(self) -> str:
+        return _short_repr(self)
 
 
 class _Row(NamedTuple):
@@ -66,6 +72,13 @@ class _Row(NamedTuple):
     joint: int
     turn_gain: float
     slide_gain: float
+
+
+def _short_repr(numbers: Pose | Twist) -> str:
+    """Return the numbers with six digits each, by name."""
+    fields = zip(numbers._fields, numbers, strict=True)
+    shown = ', '.join(f'{name}={value:.6g}' for name, value in fields)
+    return f'{type(numbers).__name__}({shown})'
 
 
 class Solver:
