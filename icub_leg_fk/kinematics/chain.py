@@ -36,7 +36,7 @@ class Row(NamedTuple):
     is_first: bool
 
     def __repr__(self) -> str:
-        return f'<Row {self.joint[:20]} {self.link!r}>'
+        return f'<Row {self.joint[:12] or "fixed"}: {replace(self.link, joint="")!r}>'
 
 
 @dataclass(frozen=True, eq=False, repr=False)

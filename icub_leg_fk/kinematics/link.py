@@ -126,13 +126,13 @@ class DHLink:
         return np.array([[1, 0, 0, self.a], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1]])
 
     def __repr__(self) -> str:
-        words = [f'{name}={getattr(self, name):.6g}' for name in ('a', 'd', 'alpha', 'offset')]
+        words = [f'{name}={getattr(self, name):.5g}' for name in ('a', 'd', 'alpha', 'offset')]
         if self.joint_type != 'revolute':
             words.append(self.joint_type)
         if self.gain != 1.0:
-            words.append(f'gain={self.gain:.6g}')
+            words.append(f'gain={self.gain:.5g}')
         if self.joint:
-            words.append(f'joint={self.joint[:20]!r}')
+            words.append(f'joint={self.joint[:12]!r}')
         return f'DHLink({", ".join(words)})'
 
 
