@@ -1,7 +1,6 @@
 """Each kind of mistake in a kinematics file ends in one line: where, what, and what instead."""
 
 from pathlib import Path
-import re
 import tempfile
 
 from hypothesis import given, settings

@@ -42,7 +42,8 @@ def row_as_yaml(link: Any) -> str:
         offset, d, more = float(link.theta), d + offset, ', type: prismatic'
     if link.isflip:
         more += ', gain: -1'
-    return f'a: {float(link.a)!r}, d: {d!r}, alpha: {float(link.alpha)!r}, offset: {offset!r}{more}'
+    a, alpha = float(link.a), float(link.alpha)
+    return f'a: {a!r}, d: {d!r}, alpha: {alpha!r}, offset: {offset!r}{more}'
 
 
 def matrix(T: Any) -> str:

@@ -110,7 +110,7 @@ def test_names_are_any_text(finger: Catalog, tmp_path: Path) -> None:
 
 def test_the_scoped_names_of_simulators_are_read(tmp_path: Path) -> None:
     file = tmp_path / 'scoped.yaml'
-    file.write_text('''
+    file.write_text("""
 units: {length: m, angle: deg}
 chains:
   arm:
@@ -120,7 +120,7 @@ chains:
     tip_frames: {dh: {frame: tool0}}
     versions:
       v1: {links: [{a: 0.1, d: 0, alpha: 90}, {a: 0.2, d: 0, alpha: 0}]}
-''')
+""")
     chain = load_chain('arm', 'v1', file=file)
     assert chain.pose({'Revolute 2': np.pi / 2, 'robot::arm::j1': 0.0})[:3] == pytest.approx(
         (0.1, 0, 0.2))
