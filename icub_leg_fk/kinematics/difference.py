@@ -138,12 +138,11 @@ def fit(ours: Array, theirs: Array) -> tuple[Array, Array]:
         T = X @ ours @ Y
         error = _error(T, theirs)
         size = float((error ** 2).sum())
-        if size < least:
-            best, least = (X, Y), size
-        step = np.linalg.lstsq(_slopes(T, theirs), -error.ravel(), rcond=1e-6)[0].astype(float)
-        X, Y = _small(step[:6]) @ X, Y @ _small(step[6:])
-        if np.abs(step).max() < 1e-12:
+        if size >= least:
             break
+        best, least = (X, Y), size
+        step = _least_squares(_slopes(T, theirs), -error.ravel())
+        X, Y = _small(step[:6]) @ X, Y @ _small(step[6:])
     return best
 
 
@@ -159,7 +158,7 @@ def _start_of_fit(ours: Array, theirs: Array) -> tuple[Array, Array]:
     columns = np.concatenate(
         (np.broadcast_to(np.eye(3), (len(ours), 3, 3)), R_X @ ours[:, :3, :3]), axis=2)
     rest = theirs[:, :3, 3] - ours[:, :3, 3] @ R_X.T
-    t = np.linalg.lstsq(columns.reshape(-1, 6), rest.ravel(), rcond=1e-6)[0]
+    t = _least_squares(columns.reshape(-1, 6), rest.ravel())
     X[:3, 3], Y[:3, 3] = t[:3], t[3:]
     return X, Y
 
@@ -183,6 +182,11 @@ def _kabsch(ours: Array, theirs: Array) -> Array:
 
 def _mean_rotation(ours: Array, theirs: Array) -> Array:
     return np.asarray((np.swapaxes(ours[:, :3, :3], 1, 2) @ theirs[:, :3, :3]).mean(axis=0))
+
+
+def _least_squares(A: Array, b: Array) -> Array:
+    """Return the smallest x with which A x is nearest to b."""
+    return np.asarray(np.linalg.pinv(A.T @ A, rcond=1e-12, hermitian=True) @ (A.T @ b))
 
 
 def _slopes(T: Array, theirs: Array) -> Array:

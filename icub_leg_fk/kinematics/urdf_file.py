@@ -102,6 +102,11 @@ class Urdf:
         joints = [_joint_element(element) for element in robot.findall('joint')]
         return cls(file, robot.get('name', ''), tuple(dict.fromkeys(links)), tuple(joints))
 
+    def tops(self) -> tuple[str, ...]:
+        """Return the links that hang on nothing: one, if the URDF is a tree."""
+        children = {joint.child for joint in self.joints}
+        return tuple(link for link in self.links if link not in children)
+
     def ends(self) -> tuple[str, ...]:
         """Return the links that nothing hangs on."""
         parents = {joint.parent for joint in self.joints}
