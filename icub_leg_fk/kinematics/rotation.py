@@ -24,7 +24,7 @@ def cos_sin(angle: ArrayLike) -> tuple[Array, Array]:
 
 
 def _without_rounding(values: Array) -> Array:
-    return np.where(np.abs(values) < _ROUNDING, 0.0, values)
+    return np.where(np.abs(values) < _ROUNDING, 0.0, values)[()]  # a float for a float
 
 
 def matrix_to_quaternion(rotation: ArrayLike) -> Array:

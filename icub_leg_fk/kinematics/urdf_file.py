@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 import math
 from pathlib import Path
@@ -21,30 +21,56 @@ _LARGEST = 1e9  # m or rad; what is larger leaves no room to compute with
 _LISTED = 12  # names in an error
 
 
-class UrdfJoint(NamedTuple):
-    """A joint of a URDF.
+class JointElement(NamedTuple):
+    """A joint as it stands in the file; only what is on a way is looked at more closely.
 
     Attributes:
         name: name of the joint.
-        kind: its type, as the URDF has it.
+        kind: its type.
         parent: name of the link before it.
-        child: name of the link behind it.
-        origin: (4, 4) transform from the child to the parent, at q = 0.
-        axis: (3,) unit vector in the child.
-        lower: smallest position [rad or m].
-        upper: largest position [rad or m].
-        mimics: the joint it follows; empty if none.
+        child: name of the link after it.
+        texts: texts by element and attribute, such as `('origin', 'xyz')`.
     """
 
     name: str
     kind: str
     parent: str
     child: str
+    texts: Mapping[tuple[str, str], str]
+
+
+class UrdfJoint(NamedTuple):
+    """A joint on the way from a root to a tip.
+
+    Attributes:
+        name: name of the joint.
+        kind: its type: `revolute`, `continuous`, `prismatic` or `fixed`.
+        origin: (4, 4) transform from the link after it to the link before it, at q = 0.
+        axis: (3,) unit vector in the link after it; 0 for a fixed one.
+        lower: smallest position [rad or m].
+        upper: largest position [rad or m].
+    """
+
+    name: str
+    kind: str
     origin: Array
     axis: Array
     lower: float
     upper: float
-    mimics: str
+
+    @property
+    def moves(self) -> bool:
+        """Whether a table has a joint here."""
+        return self.kind in MOVING
+
+    def motion(self, q: Array) -> Array:
+        """Return the (N, 4, 4) motion about or along its axis for (N,) positions [rad or m]."""
+        T = np.tile(np.eye(4), (len(q), 1, 1))
+        if self.kind == 'prismatic':
+            T[:, :3, 3] = q[:, None] * self.axis
+        else:
+            T[:, :3, :3] = turns_about(self.axis, q)
+        return T
 
 
 @dataclass(frozen=True)
@@ -55,13 +81,13 @@ class Urdf:
         file: its path.
         name: name of the robot.
         links: names of all links.
-        joints: the joint that leads to each link, by the link's name.
+        joints: every joint, in the order of the file.
     """
 
     file: str
     name: str
     links: tuple[str, ...]
-    joints: Mapping[str, UrdfJoint]
+    joints: tuple[JointElement, ...]
 
     @classmethod
     def load(cls, path: str | Path) -> Urdf:
@@ -70,7 +96,21 @@ class Urdf:
         Raises:
             InputFileError: it cannot be read or is not a URDF; says why.
         """
-        return _read(path)
+        file = str(path) if str(path).isprintable() else repr(str(path))
+        robot = _robot_element(file, _read(file, path))
+        links = [link.get('name', '') for link in robot.findall('link')]
+        joints = [_joint_element(element) for element in robot.findall('joint')]
+        return cls(file, robot.get('name', ''), tuple(dict.fromkeys(links)), tuple(joints))
+
+    def tops(self) -> tuple[str, ...]:
+        """Return the links that hang on nothing: one, if the URDF is a tree."""
+        children = {joint.child for joint in self.joints}
+        return tuple(link for link in self.links if link not in children)
+
+    def ends(self) -> tuple[str, ...]:
+        """Return the links that nothing hangs on."""
+        parents = {joint.parent for joint in self.joints}
+        return tuple(link for link in self.links if link not in parents)
 
     def path(self, root: str, tip: str) -> tuple[UrdfJoint, ...]:
         """Return the joints from a link down to another.
@@ -81,29 +121,19 @@ class Urdf:
         """
         for link in (root, tip):
             if link not in self.links:
-                guess = closest(link, self.links) or next(
-                    (name for name in self.links if link.casefold() in name.casefold()), None)
-                shown = ', '.join(self.links[:_LISTED])
-                more = ' and more' if len(self.links) > _LISTED else ''
-                raise InputFileError(f'{self.file}: unknown link {link!r}; '
-                                     + (f'did you mean {guess!r}? ' if guess else '')
-                                     + f'known: {shown}{more}')
+                self._refuse_link(link)
         joints: list[UrdfJoint] = []
+        passed = {tip}
         link = tip
         while link != root:
-            if link not in self.joints:
-                raise InputFileError(f'{self.file}: link {tip!r} is not below {root!r}; above it '
-                                     f'is {link!r}')
-            joint = self.joints[link]
-            if joint.kind not in (*MOVING, 'fixed'):
-                raise InputFileError(f'{self.file}: joint {joint.name!r} is {joint.kind}; '
-                                     f'allowed between {root!r} and {tip!r}: revolute, '
-                                     'continuous, prismatic, fixed')
-            if joint.mimics:
-                raise InputFileError(f'{self.file}: joint {joint.name!r} mimics {joint.mimics!r}; '
-                                     'a table has joints that move by themselves')
-            joints.insert(0, joint)
-            link = joint.parent
+            above = self._joint_above(link)
+            if above is None:
+                self._fail(f'link {tip!r} is not below {root!r}; above it is {link!r}')
+            joints.insert(0, self._checked(above))
+            link = above.parent
+            if link in passed:
+                self._fail(f'link {link!r} is above itself; a URDF is a tree')
+            passed.add(link)
         return tuple(joints)
 
     def forward(self, root: str, tip: str, positions: Mapping[str, Array]) -> Array:
@@ -121,108 +151,127 @@ class Urdf:
         T = np.broadcast_to(np.eye(4), (n, 4, 4))
         for joint in self.path(root, tip):
             T = T @ joint.origin
-            if joint.kind in MOVING and joint.name in positions:
-                T = T @ _motion(joint, positions[joint.name])
+            if joint.moves and joint.name in positions:
+                T = T @ joint.motion(positions[joint.name])
         return T
 
+    def _joint_above(self, link: str) -> JointElement | None:
+        above = [joint for joint in self.joints if joint.child == link]
+        if len(above) > 1:
+            names = ' and '.join(repr(joint.name) for joint in above[:2])
+            self._fail(f'link {link!r} has two parents, joints {names}; a URDF is a tree')
+        return above[0] if above else None
 
-def _motion(joint: UrdfJoint, q: Array) -> Array:
-    """Return the (N, 4, 4) motion of a joint: about its axis or along it."""
-    T = np.tile(np.eye(4), (len(q), 1, 1))
-    if joint.kind == 'prismatic':
-        T[:, :3, 3] = q[:, None] * joint.axis
+    def _checked(self, joint: JointElement) -> UrdfJoint:
+        """Return a joint with its numbers read."""
+        if joint.kind not in (*MOVING, 'fixed'):
+            self._fail(f'joint {joint.name!r} is {joint.kind}; allowed: revolute, continuous, '
+                       'prismatic, fixed')
+        if joint.parent not in self.links:
+            self._fail(f'joint {joint.name!r} names the link {joint.parent!r}, which is not there')
+        if ('mimic', 'joint') in joint.texts:
+            self._fail(f'joint {joint.name!r} mimics {joint.texts["mimic", "joint"]!r}; a table '
+                       'has joints that move by themselves')
+        origin = self._origin(joint)
+        if joint.kind == 'fixed':
+            return UrdfJoint(joint.name, joint.kind, origin, np.zeros(3), 0.0, 0.0)
+        lower, upper = self._limits(joint)
+        return UrdfJoint(joint.name, joint.kind, origin, self._axis(joint), lower, upper)
+
+    def _origin(self, joint: JointElement) -> Array:
+        x, y, z = np.eye(3)
+        roll, pitch, yaw = self._numbers(joint, 'origin', 'rpy', '0 0 0')
+        T = np.eye(4)
+        T[:3, :3] = turns_about(z, yaw) @ turns_about(y, pitch) @ turns_about(x, roll)
+        T[:3, 3] = self._numbers(joint, 'origin', 'xyz', '0 0 0')
         return T
-    T[:, :3, :3] = turns_about(joint.axis, q)
-    return T
 
+    def _axis(self, joint: JointElement) -> Array:
+        axis = np.array(self._numbers(joint, 'axis', 'xyz', '1 0 0'))
+        length = float(np.linalg.norm(axis))
+        if length < 1e-9:
+            self._fail(f'joint {joint.name!r}: axis is 0 0 0; allowed: a direction')
+        return axis / length
 
-def _read(path: str | Path) -> Urdf:
-    file = str(path) if str(path).isprintable() else repr(str(path))
+    def _limits(self, joint: JointElement) -> tuple[float, float]:
+        if joint.kind not in ('revolute', 'prismatic'):
+            return -math.inf, math.inf
+        if ('limit', 'lower') not in joint.texts and ('limit', 'upper') not in joint.texts:
+            return -math.inf, math.inf
+        lower, = self._numbers(joint, 'limit', 'lower', '0')
+        upper, = self._numbers(joint, 'limit', 'upper', '0')
+        if lower > upper:
+            self._fail(f'joint {joint.name!r}: limit lower {lower:g} is above upper {upper:g}')
+        return lower, upper
 
-    def fail(text: str) -> NoReturn:
-        raise InputFileError(f'{file}: {text}') from None
-
-    try:
-        with open(path, 'rb') as stream:
-            data = stream.read(_LARGEST_FILE + 1)
-    except (OSError, ValueError) as error:
-        fail(getattr(error, 'strerror', None) or str(error))
-    if len(data) > _LARGEST_FILE:
-        fail(f'has more than {_LARGEST_FILE} bytes; a URDF is smaller')
-    if b'<!DOCTYPE' in data or b'<!ENTITY' in data:
-        fail('declares a document type or entities, which a URDF has no use for')
-    try:
-        root = ET.fromstring(data)
-    except (ET.ParseError, ValueError, LookupError) as error:
-        fail(f'is not XML: {error}')
-    if any(str(element.tag).startswith('{http') and 'xacro' in str(element.tag)
-           for element in root.iter()):
-        fail('is a xacro file; this makes a URDF of it: xacro '
-             f'{Path(file).name} > robot.urdf')
-    if root.tag != 'robot':
-        fail(f'is not a URDF: its root is <{root.tag[:60]}>; allowed: <robot>')
-    links = tuple(dict.fromkeys(link.get('name', '') for link in root.findall('link')))
-    joints: dict[str, UrdfJoint] = {}
-    for element in root.findall('joint'):
-        joint = _joint(element, fail)
-        for link in (joint.parent, joint.child):
-            if link not in links:
-                fail(f'joint {joint.name!r} names the link {link!r}, which is not there')
-        if joint.child in joints:
-            fail(f'link {joint.child!r} has two parents, joints {joints[joint.child].name!r} and '
-                 f'{joint.name!r}; a URDF is a tree')
-        joints[joint.child] = joint
-    for link in links:
-        seen = {link}
-        while link in joints:
-            link = joints[link].parent
-            if link in seen:
-                fail(f'link {link!r} is above itself; a URDF is a tree')
-            seen.add(link)
-    return Urdf(file, root.get('name', ''), links, joints)
-
-
-def _joint(element: ET.Element, fail: Callable[[str], NoReturn]) -> UrdfJoint:
-    name = element.get('name', '')
-
-    def numbers(tag: str, key: str, default: str, count: int) -> list[float]:
-        found = element.find(tag)
-        text = default if found is None else found.get(key, default)
+    def _numbers(self, joint: JointElement, tag: str, key: str, default: str) -> list[float]:
+        """Return the numbers of an attribute, as many as its default has."""
+        if (tag, key) not in joint.texts:
+            return [float(word) for word in default.split()]
+        text = joint.texts[tag, key]
+        count = len(default.split())
         try:
             values = [float(word) for word in text.split()]
         except ValueError:
             values = []
-        if len(values) != count or not all(map(math.isfinite, values)):
-            fail(f'joint {name!r}: {tag} {key} is {text[:60]!r}; allowed: {count} finite '
-                 f'number{"s" * (count > 1)}')
-        if tag in ('origin', 'axis') and max(map(abs, values)) > _LARGEST:
-            fail(f'joint {name!r}: {tag} {key} is {text[:60]!r}; allowed: up to {_LARGEST:g}')
+        is_finite = all(math.isfinite(value) for value in values)
+        if len(values) != count or not is_finite:
+            self._fail(f'joint {joint.name!r}: {tag} {key} is {text[:60]!r}; allowed: {count} '
+                       f'finite number{"s" * (count > 1)}')
+        if tag != 'limit' and max(map(abs, values)) > _LARGEST:
+            self._fail(f'joint {joint.name!r}: {tag} {key} is {text[:60]!r}; allowed: up to '
+                       f'{_LARGEST:g}')
         return values
 
-    def link(tag: str) -> str:
-        found = element.find(tag)
-        if found is None or not found.get('link'):
-            fail(f'joint {name!r}: no {tag} link')
-        return found.get('link', '')
+    def _refuse_link(self, link: str) -> NoReturn:
+        guess = closest(link, self.links)
+        if guess is None:
+            holding = [name for name in self.links if link.casefold() in name.casefold()]
+            guess = holding[0] if holding else None
+        hint = f'did you mean {guess!r}? ' if guess else ''
+        known = ', '.join(self.links[:_LISTED])
+        more = ' and more' if len(self.links) > _LISTED else ''
+        self._fail(f'unknown link {link!r}; {hint}known: {known}{more}')
 
-    kind = element.get('type', '')
-    origin = np.eye(4)
-    x, y, z = np.eye(3)
-    roll, pitch, yaw = numbers('origin', 'rpy', '0 0 0', 3)
-    origin[:3, :3] = turns_about(z, yaw) @ turns_about(y, pitch) @ turns_about(x, roll)
-    origin[:3, 3] = numbers('origin', 'xyz', '0 0 0', 3)
-    axis = np.array(numbers('axis', 'xyz', '1 0 0', 3))
-    length = float(np.linalg.norm(axis))
-    if kind in MOVING and length < 1e-9:
-        fail(f'joint {name!r}: axis is 0 0 0; allowed: a direction')
-    lower, upper = -math.inf, math.inf
-    if kind in ('revolute', 'prismatic') and element.find('limit') is not None:
-        lower, = numbers('limit', 'lower', '0', 1)
-        upper, = numbers('limit', 'upper', '0', 1)
-        if lower > upper:
-            fail(f'joint {name!r}: limit lower {lower:g} is above '
-                 f'upper {upper:g}')
-    mimic = element.find('mimic')
-    return UrdfJoint(name, kind, link('parent'), link('child'), origin,
-                     axis / length if length else axis, lower, upper,
-                     '' if mimic is None else mimic.get('joint', '?'))
+    def _fail(self, fault: str) -> NoReturn:
+        raise InputFileError(self.file, fault)
+
+
+def _read(file: str, path: str | Path) -> bytes:
+    try:
+        with open(path, 'rb') as stream:
+            data = stream.read(_LARGEST_FILE + 1)
+    except (OSError, ValueError) as error:  # a ValueError for a zero byte in the path
+        reason = getattr(error, 'strerror', None) or str(error)
+        raise InputFileError(file, f'cannot be read: {reason.lower()}') from None
+    if len(data) > _LARGEST_FILE:
+        raise InputFileError(file, f'has more than {_LARGEST_FILE} bytes; a URDF is smaller')
+    return data
+
+
+def _robot_element(file: str, data: bytes) -> ET.Element:
+    if b'<!DOCTYPE' in data or b'<!ENTITY' in data:
+        raise InputFileError(file, 'declares a document type or entities, which a URDF has no use '
+                                   'for')
+    try:
+        robot = ET.fromstring(data)
+    except (ET.ParseError, ValueError, LookupError) as error:
+        raise InputFileError(file, f'is not XML: {error}') from None
+    if any('xacro}' in str(element.tag) for element in robot.iter()):
+        raise InputFileError(file, 'is a xacro file; this makes a URDF of it: xacro '
+                                   f'{Path(file).name} > robot.urdf')
+    if robot.tag != 'robot':
+        raise InputFileError(file, f'is not a URDF: its root is <{robot.tag[:60]}>; allowed: '
+                                   '<robot>')
+    return robot
+
+
+def _joint_element(element: ET.Element) -> JointElement:
+    texts = {}
+    for part in element:
+        if element.find(part.tag) is part:  # of several the first counts
+            for key, value in part.items():
+                texts[part.tag, key] = value
+    return JointElement(
+        element.get('name', ''), element.get('type', ''), texts.get(('parent', 'link'), ''),
+        texts.get(('child', 'link'), ''), texts)

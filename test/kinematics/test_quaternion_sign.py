@@ -51,7 +51,7 @@ def test_no_flip_on_any_path_within_half_a_turn_of_zero(chain: Chain, data: st.D
     """Straight paths between postures inside the ranges, cut where half a turn is reached."""
     inside = [st.floats(max(lower, -np.pi), min(upper, np.pi)) for lower, upper in zip(
         chain.lower.tolist(), chain.upper.tolist(), strict=True)]
-    start, end = (np.array([data.draw(values) for values in inside]) for _ in range(2))
+    start, end = np.array(data.draw(st.tuples(st.tuples(*inside), st.tuples(*inside))))
     path = start + np.linspace(0, 1, 200)[:, None] * (end - start)
     zero = chain.forward(np.zeros(chain.n))[:3, :3]
     traces = np.einsum('ij,nij->n', zero, chain.forward(path)[:, :3, :3])
