@@ -104,10 +104,10 @@ class Catalog(Frozen):
 
     def split(self, name: str) -> tuple[str, str]:
         """Return chain and version of `head_imu=v2`; an empty version where none is named."""
-        if not isinstance(name, str) or name in self.chains or '=' not in name:
+        if not isinstance(name, str) or name in self.chains:
             return name, ''
         chain, _, version = name.rpartition('=')
-        return chain, version
+        return (chain, version) if chain and version else (name, '')
 
     def _selected(self, name: str, version: str | None) -> Chain:
         """Return a chain; if it lacks the version given for all, the error says how to name it."""

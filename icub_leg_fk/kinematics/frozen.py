@@ -11,8 +11,8 @@ import numpy as np
 class Frozen:
     """Base of a frozen dataclass that holds arrays or mappings.
 
-    Arrays and mappings are read-only copies, also after copying and pickling. Two instances are
-    equal if their compared fields are, by value; -0.0 equals 0.0.
+    Arrays and mappings are read-only copies and lists are tuples, also after copying and
+    pickling. Two instances are equal if their compared fields are, by value; -0.0 equals 0.0.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
@@ -25,7 +25,9 @@ class Frozen:
         return type(self), tuple(_picklable(getattr(self, field.name)) for field in fields(self))
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, type(self)) and self._key() == other._key()
+        if not isinstance(other, type(self)):
+            return NotImplemented
+        return self._key() == other._key()
 
     def __hash__(self) -> int:
         return hash(self._key())
@@ -42,6 +44,8 @@ def _read_only(value: Any) -> Any:
         return array
     if isinstance(value, Mapping):
         return MappingProxyType(dict(value))
+    if isinstance(value, list):
+        return tuple(value)
     return value
 
 

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import math
 from pathlib import Path
 
-from icub_leg_fk.errors import LegFKError
-from icub_leg_fk.kinematics.chain import Chain, CONVENTIONS, standard_rows, TipFrame
+from icub_leg_fk.kinematics.chain import Chain, TipFrame
 from icub_leg_fk.kinematics.frozen import Frozen
-from icub_leg_fk.kinematics.link import DHLink, JOINT_TYPES
+from icub_leg_fk.kinematics.link import CONVENTIONS, DHLink, JOINT_TYPES, standard_rows
 from icub_leg_fk.kinematics.rotation import Array, is_rigid_transform, nearest_rotation
 from icub_leg_fk.kinematics.yaml_fields import Field, FRAME_ID, read_yaml, WORD
 import numpy as np
@@ -24,7 +23,7 @@ _LONGEST = 1e9  # m; what is larger leaves no room to compute with
 _UNLIKELY = 100.0  # m
 _FOUR_DECIMALS = 2e-4  # what rounding to four decimals may do to R R^T
 _EXACT = 1e-9  # below it a rotation was written with all its digits
-_MOST_VERSIONS = 10_000  # aliases can make a small file say very much
+_MOST_ROWS = 50_000  # aliases can make a small file say very much
 
 _PLACE = ('root_frame', 'joints', 'tip_frames')
 _REPLACEABLE = (*_PLACE, 'root_axes')
@@ -77,7 +76,7 @@ class _Reader:
     def __init__(self) -> None:
         self.warnings: list[str] = []
         self._length = self._angle = ''
-        self._versions_read = 0
+        self._rows_read = 0
 
     def chains(self, path: str | Path) -> tuple[str, dict[str, ChainEntry]]:
         root = read_yaml(path)
@@ -131,9 +130,6 @@ class _Reader:
             'versions by name', lambda version: f'chain {name}, version {version}')
         if not versions:
             chain['versions'].fail('at least one version', 'none')
-        self._versions_read += len(versions)
-        if self._versions_read > _MOST_VERSIONS:
-            chain['versions'].fail(f'at most {_MOST_VERSIONS} in a file', 'too many versions')
         return {version: self._version(name, tip, version, at, chain)
                 for version, at in versions.items()}
 
@@ -145,26 +141,23 @@ class _Reader:
         own = at.record(('links',), _VERSION)
         place = {**chain, **own}
         convention = own['convention'].choice(CONVENTIONS) if 'convention' in own else 'standard'
+        root_frame = place['root_frame'].name('a frame id', FRAME_ID)
         joint_names = self._joint_names(place['joints'])
         links = self._links(Field(at.file, at.where, own['links'].node), joint_names)
-        root_frame = place['root_frame'].name('a frame id', FRAME_ID)
-        try:
-            return Chain(
-                name=name,
-                version=version,
-                root_frame=root_frame,
-                tip=tip,
-                joint_names=joint_names,
-                links=standard_rows(links) if convention == 'modified' else tuple(links),
-                T_root_0=self._optional_transform(own, 'T_Ro0'),
-                tip_frames=self._tip_frames(place['tip_frames'], root_frame),
-                T_n_tip=self._optional_transform(own, 'T_nIs'),
-                convention=convention,
-                root_axes=self._root_axes(place['root_axes']) if 'root_axes' in place else (),
-                source=own['source'].text() if 'source' in own else '',
-            )
-        except LegFKError as error:
-            own['links'].fail('rows and joints that fit each other', str(error))
+        return Chain(
+            name=name,
+            version=version,
+            root_frame=root_frame,
+            tip=tip,
+            joint_names=joint_names,
+            links=standard_rows(links) if convention == 'modified' else tuple(links),
+            T_root_0=self._optional_transform(own, 'T_Ro0'),
+            tip_frames=self._tip_frames(place['tip_frames'], root_frame),
+            T_n_tip=self._optional_transform(own, 'T_nIs'),
+            convention=convention,
+            root_axes=self._root_axes(place['root_axes']) if 'root_axes' in place else (),
+            source=own['source'].text() if 'source' in own else '',
+        )
 
     def _joint_names(self, at: Field) -> tuple[str, ...]:
         joints: list[str] = []
@@ -212,6 +205,9 @@ class _Reader:
         links = []
         has_range: set[str] = set()
         for index, row in enumerate(at.items('a list of rows')):
+            self._rows_read += 1
+            if self._rows_read > _MOST_ROWS:
+                at.fail(f'at most {_MOST_ROWS} in a file', 'too many rows')
             link = self._link(row.at(f'row {index}'), joint_names, has_range)
             links.append(link)
         named = {link.joint for link in links if link.joint}

@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from icub_leg_fk.errors import InputFileError
-from icub_leg_fk.kinematics.chain import Chain, CONVENTIONS, TipFrame
-from icub_leg_fk.kinematics.link import DHLink
+from icub_leg_fk.kinematics.chain import Chain, TipFrame
+from icub_leg_fk.kinematics.link import CONVENTIONS, DHLink
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.kinematics.urdf_file import MOVING, Urdf
 import numpy as np

@@ -5,8 +5,8 @@ from pathlib import Path
 import sys
 
 from icub_leg_fk.__main__ import main
-from support.leg_fk_process import assert_one_line_complaint, leg_fk
 import pytest
+from support.leg_fk_process import assert_one_line_complaint, leg_fk
 
 SHARED = Path(__file__).resolve().parents[3] / 'shared' / 'data' / 'urdf'
 # Robot: nearest version of the legs, largest difference [mm, deg] (FACTS of icub-models).

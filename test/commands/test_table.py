@@ -8,13 +8,13 @@ from xml.sax.saxutils import quoteattr
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from icub_leg_fk.__main__ import main
 from icub_leg_fk.errors import InputFileError
 from icub_leg_fk.kinematics import Catalog, chain_from_urdf, Urdf
 from icub_leg_fk.kinematics.table_from_urdf import almost_parallel
-from icub_leg_fk.__main__ import main
-from support.leg_fk_process import assert_one_line_complaint, leg_fk
 import numpy as np
 import pytest
+from support.leg_fk_process import assert_one_line_complaint, leg_fk
 
 SHARED = Path(__file__).resolve().parents[3] / 'shared' / 'data' / 'urdf'
 MOVING = {'revolute', 'continuous', 'prismatic'}

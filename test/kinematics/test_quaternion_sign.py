@@ -10,7 +10,7 @@ from support.recorded_walk import needs_recorded_walk, read_recorded_walk, read_
 CATALOG = Catalog.load()
 CHAINS = [CATALOG.chain(name, version, frame) for name, entry in CATALOG.chains.items()
           for version, table in entry.versions.items() for frame in table.tip_frames]
-every_chain = pytest.mark.parametrize('chain', CHAINS, ids=lambda c: f'{c.tip_frame} {c.version}')
+every_chain = pytest.mark.parametrize('chain', CHAINS, ids=lambda c: f'{c.frame_id} {c.version}')
 
 
 def flips(chain: Chain, Q: np.ndarray) -> int:
