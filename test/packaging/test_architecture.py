@@ -88,7 +88,7 @@ def test_the_package_has_its_rooms_and_no_other() -> None:
     'kinematics',
     'stream',
     'node',
-    pytest.param('tools', marks=not_yet),
+    'tools',
     'commands',
 ])
 def test_a_room_imports_only_rooms_below(room: str) -> None:
