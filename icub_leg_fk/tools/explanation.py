@@ -188,8 +188,9 @@ def _refuse_pages(chain: Chain) -> None:
     twists = [link.alpha for link in chain.links if abs(math.sin(2 * link.alpha)) > 1e-9]
     if len(twists) > _MOST_TWISTS:
         raise LegFKError(
-            f'a formula of chain {chain.name} would fill pages: {len(twists)} of its alphas are '
-            f'not right angles, at most {_MOST_TWISTS} may be; give joint positions')
+            f'a formula of chain {chain.name} would fill pages, because {len(twists)} of its '
+            f'alphas are not right angles (allowed: {_MOST_TWISTS}); give joint positions, such '
+            'as with --degrees')
 
 
 def _positions(chain: Chain, q: Sequence[float] | None, numbers: Numbers) -> list[Cell]:
@@ -264,14 +265,13 @@ def _placed(chain: Chain) -> list[_Placed]:
 def _frames(chain: Chain, q: Sequence[float] | Array,
             placed: Sequence[_Placed]) -> dict[str, Array]:
     """Return all frames in the root frame by name, with their origins in mm."""
-    of_the_table = chain.frames(q)[:-1]
-    frames = {str(i): T for i, T in enumerate(of_the_table)}
-    T = of_the_table[-1]
+    *frames, _ = chain.frames(q)
     for frame in placed:
-        T = T @ frame.T
-        frames[frame.name] = T
-    scale = np.array([1, 1, 1, MM])
-    return {name: T * scale for name, T in frames.items()}
+        frames.append(frames[-1] @ frame.T)
+    for T in frames:
+        T[:3, 3] *= MM
+    names = [*map(str, range(len(frames) - len(placed))), *(frame.name for frame in placed)]
+    return dict(zip(names, frames, strict=True))
 
 
 def _constant(T: Array, numbers: Numbers) -> Matrix:

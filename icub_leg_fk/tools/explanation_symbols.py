@@ -40,8 +40,8 @@ def import_sympy(module: str = 'sympy') -> Any:
     except ImportError as error:
         raise MissingDependencyError(
             'sympy', 'an explanation in exact numbers or as a formula',
-            'pip install sympy (rosdep key python3-sympy); in decimals, with --degrees or '
-            '--radians, nothing is needed') from error
+            'pip install sympy (rosdep key python3-sympy); decimals need no library, such as '
+            'with --degrees alone') from error
 
 
 class Exact:
@@ -135,6 +135,7 @@ def degrees(radians: float) -> Fraction:
     return Fraction(f'{math.degrees(radians):.12g}')
 
 
+@cache
 def plain(cell: Cell) -> str:
     """Return an entry as text: `-0.9175 c_0 s_(3-4) + 10`."""
     if isinstance(cell, str):
@@ -163,6 +164,7 @@ def sums_of_angles(matrices: Iterable[Matrix]) -> dict[str, str]:
     return {plain(symbol(name)): str(meanings[name]) for name in sums}
 
 
+@cache
 def _as_shown(expression: Cell) -> Cell:
     """Return an expression with short names for cosines and sines, and with short numbers."""
     sympy = import_sympy()
@@ -180,10 +182,10 @@ def _as_shown(expression: Cell) -> Cell:
 def _short_number(number: Cell) -> Cell:
     """Return a number as a decimal, unless it is a simple fraction or root."""
     sympy = import_sympy()
-    if number.is_Rational and 10 ** _DECIMALS % number.q == 0:
-        return sympy.Number(short(float(number), _DECIMALS))
-    if number.has(sympy.Float) or len(str(number)) > _LONGEST:
-        return sympy.Number(short(float(number)))
+    is_decimal = number.is_Rational and 10 ** _DECIMALS % number.q == 0
+    if is_decimal or number.has(sympy.Float) or len(str(number)) > _LONGEST:
+        words = short(float(number), _DECIMALS if is_decimal else 4)
+        return sympy.Float(words) if '.' in words else sympy.Integer(words)
     return number
 
 
