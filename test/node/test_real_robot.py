@@ -1,4 +1,4 @@
-"""A real robot's walk through the node, in real time, judged by another participant."""
+"""A real robot's walk through the node, at 800 Hz, judged by another participant."""
 
 import time
 
@@ -12,19 +12,22 @@ pytestmark = needs_recorded_walk
 
 STANDING = 80.0  # N; a foot with more than this on it stands
 START = 1_700_000_000 * SECOND
+FASTER = 8  # than the robot walked
 
 
 @pytest.fixture(scope='module')
 def walk():
-    """Play the recording in real time; return it and, by foot, what came out."""
+    """Play the recording; return it and, by foot, what came out."""
     names, times, positions, forces = read_recorded_walk()
     stamps = [START + round(t * 1e9) for t in times]
     with NodeProcess({'foot_frame': 'sole', **LOSSLESS}) as node, Robot(node) as robot:
         robot.connect()
         begin = time.monotonic()
         for t, stamp, row in zip(times, stamps, positions, strict=True):
-            while (left := begin + t - time.monotonic()) > 0:
+            left = begin + t / FASTER - time.monotonic()
+            while left > 0:
                 robot.spin(left)
+                left = begin + t / FASTER - time.monotonic()
             robot.send(stamp, names, row)
         poses = {foot: robot.take(robot.poses[foot], stamps[-1]) for foot in FEET}
     return stamps, positions, forces, poses

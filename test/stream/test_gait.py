@@ -1,11 +1,11 @@
 """The gait that the demonstration plays: both feet walk, joints stay in their printed ranges."""
 
-from support.gait import PERIOD, walk
 from icub_leg_fk.kinematics import Catalog
 from icub_leg_fk.kinematics.catalog import config_file
 from icub_leg_fk.tools.recording import read_csv
 import numpy as np
 import pytest
+from support.gait import PERIOD, walk
 
 RATE = 160.0  # Hz; a period is 200 samples, half a period 100
 # The legs' ranges as printed [deg], hip_roll narrowed by the erratum -17 .. 119.
