@@ -12,6 +12,7 @@ from icub_leg_fk.errors import closest, LegFKError, ParameterError, UnknownNameE
 from icub_leg_fk.kinematics import Catalog
 from icub_leg_fk.node.arguments import files_for_others, names_given, read_arguments
 from icub_leg_fk.node.qos_overrides import PREFIX, QoSOverrides
+from icub_leg_fk.node.rclpy_private import parameter_overrides
 from icub_leg_fk.stream.configuration import (
     Configuration,
     DEFAULT_FRAME,
@@ -105,8 +106,7 @@ class NodeParameters:
     def __init__(self, node: Node, apply: Callable[[Configuration], None]) -> None:
         self._node = node
         self._apply = apply
-        # Private in rclpy, but nothing else has what is given for names that are not declared.
-        self._overrides: Mapping[str, RclpyParameter] = node._parameter_overrides
+        self._overrides = parameter_overrides(node)
         for parameter in PARAMETERS:
             self._declare(parameter)
         self._catalog = load_catalog(node.get_parameter('kinematics_file').value)

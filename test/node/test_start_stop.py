@@ -120,7 +120,7 @@ def test_files_for_all_nodes_and_for_others_are_no_reason_not_to_start(tmp_path)
     others.write_text('/other/foot_pose_publisher: {ros__parameters: {version: v3}}\n')
     files = ['--params-file', str(everybodys), '--params-file', str(others)]
     with NodeProcess(arguments=files) as node:
-        node.wait_for_log('publishing poses of left_foot (left_leg v1,')
+        node.wait_for_log('publishing poses of left_foot (left_leg=v1,')
         log = node.log()
     warnings = [line.partition(']: ')[2] for line in log.splitlines() if '[WARN]' in line]
     assert warnings == [
