@@ -5,8 +5,8 @@ import re
 
 from hypothesis import given, settings
 from icub_leg_fk.__main__ import main
-from icub_leg_fk.kinematics.chain import standard_rows
 from icub_leg_fk.kinematics.chain_text import joint_range
+from icub_leg_fk.kinematics.link import standard_rows
 from icub_leg_fk.tools.explanation import explain as explained
 from icub_leg_fk.tools.explanation_latex import as_latex
 from icub_leg_fk.tools.explanation_text import as_text
