@@ -185,6 +185,18 @@ def robot(pushed, **arguments):
     return actions.GroupAction([ros_actions.PushRosNamespace(pushed), include(**arguments)])
 
 
+def test_the_two_robots_of_the_documentation_have_their_own_versions(prefix, launched):
+    share = prefix / 'share/icub_leg_fk'
+    share.mkdir()
+    (share / 'launch').symlink_to(LAUNCH_FILE.parent)
+    page = (LAUNCH_FILE.parents[1] / 'docs/node.md').read_text()
+    names = {}
+    exec(re.search(r'^```python\n(.*?)^```', page, re.DOTALL | re.MULTILINE)[1], names)
+    assert parameters(launched(names['generate_launch_description']())) == {
+        '/icub1/foot_pose_publisher': {'version': 'v2_5', 'frame_prefix': 'icub1/'},
+        '/icub2/foot_pose_publisher': {'version': 'v3', 'frame_prefix': 'icub2/'}}
+
+
 def test_each_robot_is_included_with_its_own_namespace_and_version(launched):
     output = launched(
         robot('icub1', version='v1', frame_prefix='icub1/'),
