@@ -20,7 +20,7 @@ from icub_leg_fk.tools.viewer_page import (
     Posture,
     tip_texts,
 )
-from icub_leg_fk.tools.viewer_scene import Scene
+from icub_leg_fk.tools.viewer_scene import PosedChain, Scene
 import numpy as np
 
 PERIOD = 1 / 30  # s; the page is not updated more often
@@ -69,14 +69,15 @@ class Viewer:
         gui.configure_theme(show_logo=False, show_share_button=False)
         if source:
             source.add_controls(gui, self._on_change)
-        self._sliders = JointSliders(gui, chains, self._on_change, disabled=source is not None)
+        self._sliders = JointSliders(gui, chains, self._on_change, follow=source is not None)
         if not source:
             button = gui.add_button('back to the start', color='gray')
             button.on_click(lambda _: self._sliders.reset())
         self._add_panel(gui)
         gui.main_panel.dock_right()
         gui.main_panel.set_width(330)
-        points = [drawn.outer_points(chain, self._sliders.positions(chain)) for chain in chains]
+        points = [drawn.outer_points(PosedChain(chain, self._sliders.positions(chain)))
+                  for chain in chains]
         self._fixed = self._fixed_scene(np.vstack(points))
         self._place_camera(server, np.vstack(points))
 
@@ -94,14 +95,16 @@ class Viewer:
         scene = dict(self._fixed)
         for index, chain in enumerate(self._chains):
             q, note = postures[index]
-            if q is not None:
-                scene |= self._chain_scene(index, q)
-                self._sliders.show(dict(zip(chain.joint_names, q, strict=True)))
+            if q is None:
+                self._tips[index].show({}, note)
+                continue
+            posed = PosedChain(chain, q)
+            self._sliders.show(dict(zip(chain.joint_names, q, strict=True)))
+            self._tips[index].show(tip_texts(posed), note)
+            scene |= self._chain_scene(index, posed)
             if len(trails[index]) > 1:
-                scene |= drawn.trail_scene(chain, trails[index])
-            self._tips[index].show({} if q is None else tip_texts(chain, q), note)
+                scene |= drawn.trail_scene(posed, trails[index])
         self._canvas.show(scene)
-        self._show_method(postures)
 
     def _on_change(self, _: Any) -> None:
         self._changed.set()
@@ -114,39 +117,36 @@ class Viewer:
         postures = [Posture(self._sliders.positions(chain)) for chain in self._chains]
         return postures, [np.zeros((0, 3))] * len(postures)
 
-    def _chain_scene(self, index: int, q: Sequence[float]) -> Scene:
-        """Return a chain; while the method is shown only what stands in its background."""
-        chain, step = self._chains[index], int(self._step.value)
-        scene = drawn.ends_scene(chain, q, faint=step > 0)
-        if step and index == self._shown_chain():
-            return scene | Method(chain, q, self._size).scene(step, self._shown_row())
+    def _chain_scene(self, index: int, posed: PosedChain) -> Scene:
+        """Return a chain; while the method is shown, that or what stands in its background."""
+        step = int(self._step.value)
+        scene = drawn.ends_scene(posed, faint=step > 0)
+        if index == self._shown_chain():
+            scene |= self._show_method(posed, step)
+        elif step:
+            scene |= drawn.faint_scene(posed)
         if step:
-            return scene | drawn.faint_scene(chain, q)
-        scene |= drawn.skeleton_scene(chain, q, self._size)
+            return scene
+        scene |= drawn.skeleton_scene(posed, self._size)
         if self._frames.value:
-            scene |= drawn.frames_scene(chain, q, self._size)
+            scene |= drawn.frames_scene(posed, self._size)
         return scene
+
+    def _show_method(self, posed: PosedChain, step: int) -> Scene:
+        """Say what a step of the method says, and return what it draws."""
+        last_row = len(posed.chain.rows()) - 1
+        self._row.visible = step == 5
+        self._row.max = max(last_row, 1)
+        if not step:
+            self._words.show({'Move the slider to step 1.': []})
+            return {}
+        method, row = Method(posed, self._size), min(int(self._row.value), last_row)
+        self._words.show({f'Step {step}. {STEPS[step - 1]}': method.lines(step, row)})
+        return method.scene(step, row)
 
     def _shown_chain(self) -> int:
         """Return the index of the chain of which the method is shown."""
         return self._names.index(self._chain.value)
-
-    def _shown_row(self) -> int:
-        """Return the row of which step 5 is shown."""
-        last = len(self._chains[self._shown_chain()].rows()) - 1
-        return min(int(self._row.value), last)
-
-    def _show_method(self, postures: Sequence[Posture]) -> None:
-        """Say what a step of the method says."""
-        step, index = int(self._step.value), self._shown_chain()
-        chain, posture = self._chains[index], postures[index]
-        self._row.visible = step == 5
-        self._row.max = max(len(chain.rows()) - 1, 1)
-        title = f'Step {step}. {STEPS[step - 1]}' if step else 'Move the slider to step 1.'
-        lines: list[str] = []
-        if step and posture.q is not None:
-            lines = Method(chain, posture.q, self._size).lines(step, self._shown_row())
-        self._words.show({title: lines}, posture.note)
 
     def _add_panel(self, gui: Any) -> None:
         """Add the panel of the poses and the method."""
@@ -154,7 +154,8 @@ class Viewer:
         panel = gui.add_panel()
         with panel.add_tab('Poses'):
             root = self._chains[0]
-            gui.add_markdown(f'`{root.root_frame}`: {", ".join(drawn.axis_names(root))}')
+            where = f': {", ".join(drawn.axis_names(root))}' if root.root_axes else ''
+            gui.add_markdown(f'poses in `{root.root_frame}`{where}')
             self._frames = gui.add_checkbox('frames of the table', True)
             self._tips = []
             for chain in self._chains:

@@ -13,7 +13,6 @@ from fractions import Fraction
 import math
 import re
 
-from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array, turns_about
 from icub_leg_fk.tools import text
 from icub_leg_fk.tools.drawing import AXIS_COLORS
@@ -28,6 +27,7 @@ from icub_leg_fk.tools.viewer_scene import (
     Label,
     labels,
     polyline,
+    PosedChain,
     Scene,
     segments,
 )
@@ -71,22 +71,20 @@ class RowGeometry:
 
 
 class Method:
-    """A chain at one joint vector, for the six steps.
+    """The six steps for a chain at one joint vector.
 
     Args:
-        chain: the chain.
-        q: (n,) joint positions [rad or m].
+        posed: the chain.
         size: size of the scene [m].
     """
 
-    def __init__(self, chain: Chain, q: Sequence[float], size: float) -> None:
-        self.chain = chain
-        self.rows = chain.rows()
-        frames = chain.frames(q)
-        self.frames = frames[:-1]
-        self.tip = frames[-1]
-        self._is_modified = chain.convention == 'modified'
-        self._q = q
+    def __init__(self, posed: PosedChain, size: float) -> None:
+        self.chain = posed.chain
+        self.rows = posed.chain.rows()
+        self.frames = posed.frames[:-1]
+        self.tip = posed.frames[-1]
+        self._is_modified = posed.chain.convention == 'modified'
+        self._posed = posed
         self._size = size
 
     def scene(self, step: int, row: int) -> Scene:
@@ -97,7 +95,7 @@ class Method:
             return self._product_scene()
         scene = self._axis_scene('z', 2, 0.17)
         if step == 1:
-            return scene | faint_scene(self.chain, self._q)
+            return scene | faint_scene(self._posed)
         scene |= self._origin_scene() | self._path_scene(range(len(self.rows)), INK)
         if step >= 3:
             scene |= self._axis_scene('x', 0, 0.11)
@@ -140,7 +138,7 @@ class Method:
 
     def _moved(self, row: int) -> float:
         """Return how far the joint of a row has moved it [rad or m]."""
-        return self.rows[row].link.gain * float(self._q[self.rows[row].joint_index])
+        return self.rows[row].link.gain * float(self._posed.q[self.rows[row].joint_index])
 
     def _axis_scene(self, letter: str, column: int, length: float) -> Scene:
         """Return one axis of every frame with its name; a z axis goes on beyond its origin."""

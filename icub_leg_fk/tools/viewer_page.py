@@ -16,7 +16,7 @@ from icub_leg_fk.kinematics import Chain, DHLink
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.tools import text
 from icub_leg_fk.tools.signals import held_signals
-from icub_leg_fk.tools.viewer_scene import Dots, Label, Lines, Scene
+from icub_leg_fk.tools.viewer_scene import Dots, Label, Lines, PosedChain, Scene
 import numpy as np
 
 _BEYOND = 0.2  # of a range; so far beyond it a slider goes
@@ -155,12 +155,13 @@ class JointSliders:
         gui: viser's, where they go.
         chains: the chains; a joint of several has one slider.
         changed: called when a slider is moved.
-        disabled: whether the sliders only show what something else moves.
+        follow: whether the sliders only show what something else moves.
     """
 
     def __init__(self, gui: Any, chains: Sequence[Chain], changed: Changed,
-                 disabled: bool) -> None:
+                 follow: bool) -> None:
         self._gui = gui
+        self._follow = follow
         self._links: dict[str, DHLink] = {}
         self._sliders: dict[str, Any] = {}
         self._lines: dict[str, Any] = {}
@@ -168,15 +169,15 @@ class JointSliders:
             with gui.add_folder(f'{chain.name} {chain.version}'):
                 for name, link in zip(chain.joint_names, chain.joints, strict=True):
                     if name not in self._links:
-                        self._add(name, link, disabled)
+                        self._add(name, link)
                         self._sliders[name].on_update(changed)
 
-    def _add(self, name: str, link: DHLink, disabled: bool) -> None:
+    def _add(self, name: str, link: DHLink) -> None:
         low, high = slider_bounds(link)
         unit = 'm' if link.is_prismatic else 'degrees'
         self._links[name] = link
         self._sliders[name] = self._gui.add_slider(
-            name, low, high, _STEP[link.joint_type], slider_start(link), disabled=disabled,
+            name, low, high, _STEP[link.joint_type], slider_start(link), disabled=self._follow,
             hint=f'{name} in {unit}')
         self._lines[name] = self._gui.add_html('')
 
@@ -189,14 +190,14 @@ class JointSliders:
         return value if self._links[name].is_prismatic else math.radians(value)
 
     def show(self, positions: Mapping[str, float]) -> None:
-        """Say of joint positions [rad or m] whether they are in range, and move sliders there.
+        """Say whether joint positions [rad or m] are in range; sliders that follow move there.
 
         Beyond its end a slider cannot go.
         """
         for name, position in positions.items():
             link, slider = self._links[name], self._sliders[name]
             self._lines[name].content = _range_line(link, position)
-            if position != self._position(name):
+            if self._follow:
                 shown = position if link.is_prismatic else math.degrees(position)
                 slider.value = min(max(shown, slider.min), slider.max)
 
@@ -264,11 +265,11 @@ def _div(words: str, color: str) -> str:
     return f'<div style="{_SMALL};color:{color}">{html.escape(words)}</div>'
 
 
-def tip_texts(chain: Chain, q: Sequence[float]) -> dict[str, list[str]]:
+def tip_texts(posed: PosedChain) -> dict[str, list[str]]:
     """Return the pose of a chain's tip in texts by title, in the numbers of `leg_fk pose`."""
-    T = chain.forward(q)
+    T = posed.frames[-1]
     xyz = [text.fixed(value, 7) for value in T[:3, 3]]
-    xyzw = [text.fixed(value, 7) for value in chain.pose(q)[3:]]
+    xyzw = [text.fixed(value, 7) for value in posed.chain.pose(posed.q)[3:]]
     angles = [text.fixed(math.degrees(angle), 4) for angle in roll_pitch_yaw(T[:3, :3])]
     cells = [[text.fixed(value, 7) for value in row] for row in T[:3].tolist()]
     return {'position (m)': [_named('xyz', xyz)],

@@ -70,14 +70,14 @@ class Recording:
         self._end = max(float(track.times[-1]) for track in tracks)
         self._at = self._start
         self._played = clock()
-        self.is_moving = True
+        self.is_moving = False
 
     def add_controls(self, gui: Any, changed: Changed) -> None:
         """Add the time line, pause and speed to the page."""
         with gui.add_folder('recording'):
             self._line = gui.add_slider('time [s]', self._start, self._end, 0.01, self._start)
-            self._speed = gui.add_dropdown('speed', _SPEEDS, '1')
-            self._button = gui.add_button('pause')
+            self._speed = gui.add_dropdown('speed', _SPEEDS, initial_value='1')
+            self._button = gui.add_button('play')
         self._shown = self._line.value
         self._line.on_update(changed)
         self._button.on_click(self._press)

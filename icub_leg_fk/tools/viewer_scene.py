@@ -10,7 +10,6 @@ from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.tools.drawing import AXIS_COLORS, color_of
 import numpy as np
-from numpy.typing import ArrayLike
 
 INK = '#222222'
 FAINT = '#9a9a9a'
@@ -69,6 +68,33 @@ class Label:
 
 
 Scene = dict[str, Lines | Dots | Label]
+
+
+class PosedChain:
+    """A chain at one joint vector, and where it is in the root frame.
+
+    Attributes:
+        chain: the chain.
+        q: n joint positions [rad or m].
+        frames: (m + 2, 4, 4) frame 0, a frame for each of the m rows, and the tip's.
+        corners: (K, 3) corners of the sole [m]; None if there is no sole.
+    """
+
+    def __init__(self, chain: Chain, q: Sequence[float]) -> None:
+        self.chain = chain
+        self.q = q
+        self.frames = chain.frames(q)
+        self.corners = chain.sole_outline(q)
+
+    @property
+    def origins(self) -> Array:
+        """(m + 2, 3) the frames' origins [m]."""
+        return self.frames[:, :3, 3]
+
+    @property
+    def tree_name(self) -> str:
+        """The chain's name without the slash that would make a branch of the scene's tree."""
+        return self.chain.name.replace('/', '%2F')
 
 
 def segments(ends: Array, color: str, width: float) -> Lines:
@@ -143,18 +169,18 @@ def axis_names(chain: Chain) -> list[str]:
     return [f'{axis} {word}'.strip() for axis, word in zip('xyz', words, strict=True)]
 
 
-def outer_points(chain: Chain, q: ArrayLike) -> Array:
+def outer_points(posed: PosedChain) -> Array:
     """Return (N, 3) points between which a chain is, from the root to its tip and sole."""
-    points = np.vstack((np.zeros((1, 3)), chain.frames(q)[:, :3, 3]))
-    corners = chain.sole_outline(q)
-    return points if corners is None else np.vstack((points, corners))
+    points = np.vstack((np.zeros((1, 3)), posed.origins))
+    return points if posed.corners is None else np.vstack((points, posed.corners))
 
 
 def root_scene(chain: Chain, size: float) -> Scene:
     """Return the root's axes with their names."""
     length = 0.15 * size
+    aside = np.full(3, -0.02 * size)  # frame 0 may be in the same place
     scene: Scene = {'root/axes': axes(np.eye(4)[None], length, 4.0),
-                    'root/name': Label(chain.root_frame, np.zeros(3))}
+                    'root/name': Label(chain.root_frame, aside)}
     return scene | labels('root/axis', axis_names(chain), 1.1 * length * np.eye(3), size)
 
 
@@ -180,53 +206,38 @@ def _round_step(length: float) -> float:
     return max(decade * step for step in (1, 2, 5) if decade * step <= length * (1 + 1e-9))
 
 
-def skeleton_scene(chain: Chain, q: ArrayLike, size: float) -> Scene:
-    """Return a chain as lines through the origins of its frames, with its joints.
-
-    Args:
-        chain: the chain.
-        q: (n,) joint positions [rad or m].
-        size: size of the scene [m].
-    """
-    name = _tree_name(chain)
-    points = chain.frames(q)[:, :3, 3]
-    return {f'{name}/bones': polyline(points, color_of(chain), 6.0),
-            f'{name}/joints': Dots(points[:-1], INK, DOT * size)}
+def skeleton_scene(posed: PosedChain, size: float) -> Scene:
+    """Return a chain as lines through the origins of its frames, with its joints."""
+    bones = polyline(posed.origins, color_of(posed.chain), 6.0)
+    return {f'{posed.tree_name}/bones': bones,
+            f'{posed.tree_name}/joints': Dots(posed.origins[:-1], INK, DOT * size)}
 
 
-def faint_scene(chain: Chain, q: ArrayLike) -> Scene:
+def faint_scene(posed: PosedChain) -> Scene:
     """Return a chain as thin lines in the background."""
-    return {f'{_tree_name(chain)}/bones': polyline(chain.frames(q)[:, :3, 3], FAINT, 2.0)}
+    return {f'{posed.tree_name}/bones': polyline(posed.origins, FAINT, 2.0)}
 
 
-def ends_scene(chain: Chain, q: ArrayLike, faint: bool) -> Scene:
+def ends_scene(posed: PosedChain, faint: bool) -> Scene:
     """Return the line from a chain's root to its frame 0, and the outline of its sole."""
-    name = _tree_name(chain)
-    to_root = np.stack((np.zeros(3), chain.T_root_0[:3, 3]))
-    scene: Scene = {f'{name}/to root': polyline(to_root, FAINT, 2.0)}
-    corners = chain.sole_outline(q)
-    if corners is not None:
-        outline = np.vstack((corners, corners[:1]))
-        color, width = (FAINT, 2.0) if faint else (color_of(chain), 4.0)
-        scene[f'{name}/sole'] = polyline(outline, color, width)
+    to_root = np.stack((np.zeros(3), posed.origins[0]))
+    scene: Scene = {f'{posed.tree_name}/to root': polyline(to_root, FAINT, 2.0)}
+    if posed.corners is not None:
+        outline = np.vstack((posed.corners, posed.corners[:1]))
+        color, width = (FAINT, 2.0) if faint else (color_of(posed.chain), 4.0)
+        scene[f'{posed.tree_name}/sole'] = polyline(outline, color, width)
     return scene
 
 
-def frames_scene(chain: Chain, q: ArrayLike, size: float) -> Scene:
+def frames_scene(posed: PosedChain, size: float) -> Scene:
     """Return the frames of a chain's table, and the tip's, with their names."""
-    name = _tree_name(chain)
-    frames = chain.frames(q)
-    names = [*map(str, range(len(frames) - 1)), chain.frame_id]
-    scene: Scene = {f'{name}/frames': axes(frames[:-1], 0.06 * size, 2.0),
-                    f'{name}/tip': axes(frames[-1:], 0.12 * size, 4.0)}
-    return scene | labels(f'{name}/frame', names, frames[:, :3, 3], size)
+    frames = posed.frames
+    names = [*map(str, range(len(frames) - 1)), posed.chain.frame_id]
+    scene: Scene = {f'{posed.tree_name}/frames': axes(frames[:-1], 0.06 * size, 2.0),
+                    f'{posed.tree_name}/tip': axes(frames[-1:], 0.12 * size, 4.0)}
+    return scene | labels(f'{posed.tree_name}/frame', names, posed.origins, size)
 
 
-def trail_scene(chain: Chain, points: Array) -> Scene:
+def trail_scene(posed: PosedChain, points: Array) -> Scene:
     """Return the way that a chain's tip has come, through (N, 3) points."""
-    return {f'{_tree_name(chain)}/trail': polyline(points, color_of(chain), 2.0)}
-
-
-def _tree_name(chain: Chain) -> str:
-    """Return a chain's name without the slash that would make a branch of the scene's tree."""
-    return chain.name.replace('/', '%2F')
+    return {f'{posed.tree_name}/trail': polyline(points, color_of(posed.chain), 2.0)}
