@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import os
 from pathlib import Path
 import time
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
 from icub_leg_fk.errors import InputFileError, OutputFileError
 from icub_leg_fk.kinematics import Catalog, Chain
@@ -23,12 +23,17 @@ from icub_leg_fk.stream.configuration import (
 from icub_leg_fk.stream.joint_input import JointInput, Look
 from icub_leg_fk.stream.notes import names_that_came, notes_of
 from icub_leg_fk.stream.pose_stream import PoseStream, Send, Senders
-from icub_leg_fk.tools.bags import Bag, import_rosbags, new_bag, open_bag, reliable_qos, STORAGES
+from icub_leg_fk.tools.bags import (
+    Bag,
+    Connection,
+    import_rosbags,
+    new_bag,
+    open_bag,
+    reliable_qos,
+    STORAGES,
+)
 from icub_leg_fk.tools.output_file import check_target, is_bag
 from icub_leg_fk.tools.progress import Progress
-
-if TYPE_CHECKING:
-    from rosbags.interfaces import Connection
 
 NODE = '/foot_pose_publisher'
 POSE = 'geometry_msgs/msg/PoseStamped'
@@ -348,7 +353,7 @@ def _refuse_strangers(source: str | Path, look: Look, chains: Iterable[Chain]) -
     fault = 'has a joint of any chain' if look.messages else 'of joint states'
     wanted = '; '.join(f'{chain.name} needs {", ".join(chain.joint_names)}' for chain in chains)
     raise InputFileError(str(source), f'no message {fault}; {wanted}; names found: '
-                                      f'{names_that_came(look) or "none"}')
+                                      f'{names_that_came(look)}')
 
 
 def _refuse_overlap(source: str | Path, target: str | Path) -> None:

@@ -15,20 +15,19 @@ import re
 import sqlite3
 import tempfile
 from types import ModuleType
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
 from icub_leg_fk.errors import InputFileError, MissingDependencyError, OutputFileError
 from icub_leg_fk.tools.output_file import is_bag, whole_path
 from icub_leg_fk.tools.progress import Progress
 import yaml
 
-if TYPE_CHECKING:
-    from rosbags.interfaces import Connection
-
 DEFAULT_TOPIC = '/joint_states'
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 METADATA = 'metadata.yaml'
 STORAGES = {'.mcap': 'mcap', '.db3': 'sqlite3'}
+
+Connection = Any  # of rosbags: a topic of a recording, its type and QoS
 
 _MEND = {'.mcap': '`mcap recover` may mend it', '.db3': '`ros2 bag reindex` may mend it'}
 _CLEAN = re.compile(r'/?(?!/)[A-Za-z0-9._/ +@:,=-]*')  # what also sqlite takes as it is

@@ -396,8 +396,8 @@ def _draw_scenes(figure: Figure, tracks: Sequence[ChainTrack], instants: Sequenc
             q = track.positions[track.nearest(instant)]
             points.append(track.chain.frames(q)[:, :3, 3])
     everywhere = np.vstack(points)
-    for place, letter, instant in zip(places, LETTERS, instants):
-        space = Space(figure, place, everywhere)
+    for i, (letter, instant) in enumerate(zip(LETTERS, instants)):
+        space = Space(figure, places[i], everywhere)
         _draw_scene(space, tracks, instant)
         space.axes.text2D(0.06, 0.95, f'{letter}  {instant:.2f} s', weight='bold',
                           transform=space.axes.transAxes)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 import csv
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,7 +18,7 @@ from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.stream.configuration import DEFAULT_TIMEOUT
 from icub_leg_fk.stream.joint_input import JointInput, Look
-from icub_leg_fk.stream.notes import names_that_came, Note, notes_of
+from icub_leg_fk.stream.notes import Note, notes_of
 from icub_leg_fk.tools.bags import DEFAULT_TOPIC, import_rosbags, JOINT_STATE, new_bag, open_bag
 from icub_leg_fk.tools.options import LARGEST, number
 from icub_leg_fk.tools.progress import Progress
@@ -28,7 +28,8 @@ from numpy.typing import NDArray
 TIMES = ('time', 'Time', 'timestamp')
 EPOCH = 1e8  # s; times beyond it count from 1970 and not from the start
 
-_NANOSECONDS = 1_000_000_000
+_NANOSECONDS = 1_000_000_000  # in a second
+_ENCAPSULATION = b'\x00\x01\x00\x00'  # CDR, little-endian
 
 Messages = Iterable[tuple[int, bytes]]  # time of recording [ns] and CDR bytes of a JointState
 
@@ -94,13 +95,13 @@ class Reading(NamedTuple):
 
     Attributes:
         tracks: of the chains that have a pose.
-        poseless: the others, with what they lack, in words.
-        notes: what there is to say of the joint states of the former.
+        warnings: what there is to say of the joint states, and why other chains have no pose.
+        notes: what there is to say of the file.
     """
 
     tracks: list[ChainTrack]
-    poseless: list[str]
-    notes: list[Note]
+    warnings: list[str]
+    notes: list[str]
 
 
 def time_span(tracks: Sequence[ChainTrack]) -> tuple[float, float]:
@@ -129,50 +130,53 @@ def read_tracks(path: str | Path, chains: Sequence[Chain], topic: str | None = N
         with open_bag(path) as bag:
             connections = bag.joint_connections(topic)
             messages = ((time, data) for _, time, data in bag.messages(connections, progress))
-            return _follow(path, messages, chains, connections[0].topic)
+            tracks, look = _follow(messages, chains)
+        return _reading(path, tracks, notes_of(look, connections[0].topic), bag.notes)
     if topic is not None:
         raise LegFKError(f'--joint-topic: {path} is a CSV file, which has no topics')
     joint_names = dict.fromkeys(name for chain in chains for name in chain.joint_names)
     recording = read_csv(path, joint_names)
-    return _follow(path, joint_states(recording), chains, '', start=0)
+    tracks, look = _follow(joint_states(recording), chains, start=0)
+    return _reading(path, tracks, notes_of(look), [])
 
 
-def _follow(path: str | Path, messages: Messages, chains: Sequence[Chain], topic: str,
-            start: int | None = None) -> Reading:
-    """Return what chains do by some messages, in times since `start` [ns] or their first pose."""
+def _follow(messages: Messages, chains: Sequence[Chain], start: int | None = None
+            ) -> tuple[dict[str, ChainTrack], Look]:
+    """Return what chains do by some messages, by name, and what there is to see of these.
+
+    Times count from `start` [ns], or from the first pose.
+    """
     now = 0
     joint_input = JointInput(lambda: now)
     joint_input.configure(chains, DEFAULT_TIMEOUT)
     stamps = {chain.name: array('q') for chain in chains}
     positions = {chain.name: array('d') for chain in chains}
-    for now, data in messages:  # noqa: B007 (a message without a stamp has this one)
+    for now, data in messages:  # noqa: B007 (which a message without a stamp has instead)
         for ready in joint_input.feed(data):
             stamps[ready.chain.name].append(ready.stamp)
             positions[ready.chain.name].extend(ready.positions)
-    look = joint_input.take_look()
-    poseless = [_lack(joint_input, chain) for chain in chains if not stamps[chain.name]]
-    if len(poseless) == len(chains):
-        raise InputFileError(str(path), f'no pose in {look.messages} joint states: '
-                                        f'{"; ".join(poseless)}; names found: '
-                                        f'{names_that_came(look) or "none"}')
     if start is None:
-        start = min(of_chain[0] for of_chain in stamps.values() if of_chain)
-    tracks = []
+        start = min((of_chain[0] for of_chain in stamps.values() if of_chain), default=0)
+    tracks = {}
     for chain in chains:
-        if stamps[chain.name]:
-            times = (np.frombuffer(stamps[chain.name], dtype=np.int64) - start) / _NANOSECONDS
-            q = np.frombuffer(positions[chain.name]).reshape(len(times), chain.n)
-            tracks.append(ChainTrack(chain, times, q))
-    drawn = {'', *(track.chain.name for track in tracks)}
-    notes = [note for note in notes_of(look, topic) if note.chain in drawn]
-    return Reading(tracks, poseless, notes)
+        times = (np.frombuffer(stamps[chain.name], dtype=np.int64) - start) / _NANOSECONDS
+        q = np.frombuffer(positions[chain.name]).reshape(-1, chain.n)
+        tracks[chain.name] = ChainTrack(chain, times, q)
+    return tracks, joint_input.take_look()
 
 
-def _lack(joint_input: JointInput, chain: Chain) -> str:
-    """Return what a chain lacks that has no pose."""
-    held = joint_input.held_stamps(chain)
-    missing = [name for name in chain.joint_names if name not in held]
-    return f'{chain.name} needs {", ".join(missing) or "joint positions that are finite"}'
+def _reading(path: str | Path, tracks: Mapping[str, ChainTrack], warnings: Sequence[Note],
+             notes: Sequence[str]) -> Reading:
+    """Return the tracks that have poses, and of the others why they have none."""
+    faults = {name: [note.text for note in warnings if note.chain in ('', name)]
+              for name, track in tracks.items() if not len(track.times)}
+    poseless = [f'{name} has no pose: {"; ".join(texts) or "no message has any positions"}'
+                for name, texts in faults.items()]
+    if len(poseless) == len(tracks):
+        raise InputFileError(str(path), '; '.join(poseless))
+    said = [str(note) for note in warnings if note.chain not in faults]
+    drawn = [track for name, track in tracks.items() if name not in faults]
+    return Reading(drawn, said + poseless, list(notes))
 
 
 def read_csv(path: str | Path, joint_names: Iterable[str]) -> JointRecording:
@@ -278,16 +282,27 @@ def _shown(header: Sequence[str]) -> str:
 
 def joint_states(recording: JointRecording) -> Iterator[tuple[int, bytes]]:
     """Yield time [ns] and CDR bytes of a JointState per sample of a recording."""
-    encode = _joint_state_encoder(recording.joint_names)
-    for time, q in zip(recording.times.tolist(), recording.positions):
+    names = recording.joint_names
+    head = _padded(_string(''), 4) + struct.pack('<I', len(names))
+    for name in names:
+        head += _padded(_string(name), 4)
+    head += struct.pack('<I', len(names))
+    head = _padded(head, 8)  # as it stands after a stamp of 8 bytes
+    pack = struct.Struct(f'<4siI{len(head)}s{len(names)}dII').pack
+    for time, q in zip(recording.times.tolist(), recording.positions.tolist()):
         stamp = round(time * _NANOSECONDS)
-        yield stamp, encode(stamp, q)
+        yield stamp, pack(_ENCAPSULATION, *divmod(stamp, _NANOSECONDS), head, *q, 0, 0)
 
 
-def _joint_state_encoder(names: Sequence[str]) -> Callable[[int, Array], bytes]:
-    """Return what serializes JointStates with these names, from stamps [ns] and positions."""
-    head = struct.pack('<IxI', 1, len(names))[4:]
-    raise NotImplementedError
+def _string(text: str) -> bytes:
+    """Return a string as CDR has it."""
+    data = text.encode() + b'\0'
+    return struct.pack('<I', len(data)) + data
+
+
+def _padded(data: bytes, size: int) -> bytes:
+    """Return bytes filled up to a multiple of a size."""
+    return data + bytes(-len(data) % size)
 
 
 def write_joint_states(path: str | Path, sent: Messages, *, force: bool) -> None:
