@@ -13,7 +13,7 @@ import sys
 from typing import Any, NamedTuple
 
 from icub_leg_fk.errors import LegFKError, OutputFileError, ParameterError
-from icub_leg_fk.stream.configuration import DEFAULT_FRAME, DEFAULT_TIMEOUT, LEGS
+from icub_leg_fk.stream.configuration import DEFAULT_TIMEOUT
 from icub_leg_fk.tools import options
 from icub_leg_fk.tools.add_poses import add_foot_poses, Summary
 from icub_leg_fk.tools.bags import STORAGES
@@ -53,14 +53,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='bags to work on at a time (default: 1)')
     options.add(parser, '--chains', '--version', '--foot-frame', '--joint-topic',
                 '--kinematics-file', '--force')
-    parser.set_defaults(chains=LEGS, version='', foot_frame=DEFAULT_FRAME)
     parser.add_argument('--frame-prefix', metavar='PREFIX', default='',
                         help='put before every frame id')
     parser.add_argument('--joint-timeout', metavar='S', type=float, default=DEFAULT_TIMEOUT,
                         help='age of a joint beside the newest of its chain above which there is '
                              f'no pose; 0 turns this off (default: {DEFAULT_TIMEOUT})')
     parser.add_argument('--storage', metavar='{mcap,sqlite3}', choices=('mcap', 'sqlite3'),
-                        default='',
                         help='storage of the new bag (default: as OUT says, or as in the old one)')
     parser.add_argument('--twist', action='store_true',
                         help='also add the velocities of the tips, from the joint velocities')
@@ -74,8 +72,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Convert the bags."""
     tasks = _tasks(args)
-    names = signature(add_foot_poses).parameters
-    settings = {name: value for name, value in vars(args).items() if name in names}
+    given = {name: value for name, value in vars(args).items() if value is not None}
+    settings = {name: given[name] for name in signature(add_foot_poses).parameters.keys() & given}
     failed = False
     for task, outcome in _outcomes(tasks, settings, args.jobs):
         if isinstance(outcome, Summary):

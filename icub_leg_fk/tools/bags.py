@@ -80,8 +80,8 @@ class Bag:
 
     Attributes:
         path: path of the recording.
-        connections: its topics as metadata.yaml describes them, and those that only its files
-            have; each with the number of messages that the files hold.
+        connections: its topics as metadata.yaml describes them, or as the files do what it leaves
+            out; each with the number of messages that the files hold.
         custom_data: what its metadata keeps by name.
         seconds: time from the first to the last message [s].
         notes: what a user should know of it, one line each.
@@ -99,7 +99,9 @@ class Bag:
         held = Counter[int]()
         for each in stored:
             held[pairs[each.id].id] += each.msgcount
-        described = {each.id: each for each in (*listed, *pairs.values())}
+        paired_ids = {each.id for each in pairs.values()}
+        there = [each for each in listed if each.id in paired_ids or not each.msgcount]
+        described = {each.id: each for each in (*there, *pairs.values())}
         counted = {id_: each._replace(msgcount=held[id_]) for id_, each in described.items()}
         self._connection_of = {id_: counted[each.id] for id_, each in pairs.items()}
         self.connections = list(counted.values())

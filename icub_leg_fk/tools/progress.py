@@ -7,6 +7,7 @@ import time
 from typing import Any
 
 from icub_leg_fk.errors import MissingDependencyError
+from icub_leg_fk.tools.terminal import import_rich
 
 Progress = Callable[[float], None]  # takes the share that is done, 0 to 1
 
@@ -45,13 +46,9 @@ def shown_progress(what: str) -> Iterator[Progress | None]:
 
 def _bar() -> Any:
     """Return a bar of rich that leaves nothing on the terminal."""
-    try:
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn
-    except ImportError as error:
-        raise MissingDependencyError('rich', 'progress', 'pip install rich') from error
-    console = Console(stderr=True, markup=False, highlight=False)
-    name = TextColumn('{task.description}', markup=False)
-    share = TextColumn('{task.percentage:3.0f} %', markup=False)
-    return Progress(name, BarColumn(), share, console=console, transient=True,
-                    redirect_stdout=False)
+    rich = import_rich('progress')
+    console = rich.console.Console(stderr=True, markup=False, highlight=False)
+    name = rich.progress.TextColumn('{task.description}', markup=False)
+    share = rich.progress.TextColumn('{task.percentage:3.0f} %', markup=False)
+    return rich.progress.Progress(name, rich.progress.BarColumn(), share, console=console,
+                                  transient=True, redirect_stdout=False)
