@@ -199,23 +199,16 @@ class JointInput:
     def feed(self, data: bytes) -> list[Ready]:
         """Take one serialized JointState in and return the joint vectors it makes ready."""
         self.messages += 1
-        try:
-            form = self._reader.form_of(data)
-        except MalformedMessageError as error:
-            return self._reject('malformed', str(error))
-        if form.look is not self._look:
-            form.look = self._look
-            self._look.meet(form)
-        if form.fault is not None:
-            return self._reject(*form.fault)
-        if not form.chains:
+        form = self._form_of(data)
+        if form is None or not form.chains:
             return []
         sec, nanosec = form.stamp(data)
         if sec == 0 and nanosec == 0:
             sec, nanosec = divmod(self._now(), _SECOND)
         if sec > _LAST_SECOND:  # a bag may say that it was recorded then
-            return self._reject('malformed', f'it has no stamp, and the time is {sec} s; '
-                                f'allowed: up to {_LAST_SECOND} s')
+            self._reject('malformed', f'it has no stamp, and the time is {sec} s; allowed: up to '
+                         f'{_LAST_SECOND} s')
+            return []
         brought = self._hold(form, sec * _SECOND + nanosec, data)
         ready = []
         for state, pick in form.chains:
@@ -243,11 +236,25 @@ class JointInput:
         names = [name for name in chain.joint_names if name in self._held]
         return {name: self._held[name].stamp for name in names}
 
-    def _reject(self, reason: str, fault: str) -> list[Ready]:
+    def _form_of(self, data: bytes) -> Form | None:
+        """Return the form of a message; None if it is rejected."""
+        try:
+            form = self._reader.form_of(data)
+        except MalformedMessageError as error:
+            self._reject('malformed', str(error))
+            return None
+        if form.look is not self._look:
+            form.look = self._look
+            self._look.meet(form)
+        if form.fault is not None:
+            self._reject(*form.fault)
+            return None
+        return form
+
+    def _reject(self, reason: str, fault: str) -> None:
         """Count and note a message that gives nothing."""
         self._look.rejected[reason] += 1
         self._look.faults[reason] = fault
-        return []
 
     def _hold(self, form: Form, stamp: int, data: bytes) -> _Brought:
         """Hold what a message brings, and forget what is held if time has stepped back."""
