@@ -13,9 +13,9 @@ import re
 import textwrap
 from typing import Any
 
+from icub_leg_fk.kinematics.chain_text import position, short
 from icub_leg_fk.tools import options, text
 from icub_leg_fk.tools.explanation import Cell, Explanation, Matrix, Step, work_out
-from icub_leg_fk.tools.text import short
 
 EXAMPLES = """\
 Without joint positions the answer is a formula in q_i. Lengths are mm, as in printed tables.
@@ -116,7 +116,7 @@ def _blocks(e: Explanation) -> Iterator[Any]:
     if e.source:
         yield 'words', f'Table from: {e.source}'
     values = 'symbols `q_i`' if e.q is None else ', '.join(
-        f'{name} {text.position(link, value)}' for name, link, value
+        f'{name} {position(link, value)}' for name, link, value
         in zip(chain.joint_names, chain.joints, e.q, strict=True))
     yield 'words', f'Joint positions: {values}. Lengths in mm.'
     yield from _frames(e)

@@ -9,11 +9,11 @@ import tempfile
 
 from icub_leg_fk.errors import LegFKError
 from icub_leg_fk.kinematics import Catalog, Chain, chain_from_urdf, DHLink, Urdf
+from icub_leg_fk.kinematics.chain_text import short
 from icub_leg_fk.kinematics.rotation import angle_between, Array
 from icub_leg_fk.kinematics.table_from_urdf import almost_parallel
 from icub_leg_fk.tools import options
 from icub_leg_fk.tools.output_file import check_target, write_text
-from icub_leg_fk.tools.text import short
 import numpy as np
 
 EXAMPLES = """\

@@ -7,11 +7,10 @@ import sys
 from xml.etree import ElementTree
 import zlib
 
-from support.gait import walk
-from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.kinematics import Catalog, config_file
 from icub_leg_fk.__main__ import main
 from icub_leg_fk.commands.plot import default_instants
-from icub_leg_fk.tools.recording import ChainTrack
+from icub_leg_fk.tools.recording import ChainTrack, read_csv
 from support.leg_fk_process import assert_one_line_complaint, leg_fk
 import numpy as np
 import pytest
@@ -25,7 +24,7 @@ JOINTS = [f'{side}_{joint}' for side in 'lr' for joint in (
 
 @pytest.fixture(scope='module')
 def gait():
-    return walk(Catalog.load(), 'v2_5', seconds=2.0)
+    return read_csv(config_file('examples/synthetic_walk.csv'), JOINTS).first(1.99)
 
 
 @pytest.fixture
