@@ -12,9 +12,10 @@ from icub_leg_fk.errors import InputFileError, LegFKError
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.stream.configuration import LEGS
 from icub_leg_fk.tools import options
-from icub_leg_fk.tools.recording import read_bag, read_csv
+from icub_leg_fk.tools.progress import shown_progress
+from icub_leg_fk.tools.recording import read_tracks
 from icub_leg_fk.tools.viewer import Source, Viewer
-from icub_leg_fk.tools.viewer_live import DEFAULT_TOPIC, LiveJoints
+from icub_leg_fk.tools.viewer_live import DEFAULT_TOPIC, live_joints
 from icub_leg_fk.tools.viewer_page import running_server
 from icub_leg_fk.tools.viewer_recording import RecordedChain, Recording
 from icub_leg_fk.tools.viewer_scene import axis_names
@@ -67,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
             chains, source = _recording(args.recording, chains, args.joint_topic)
         elif args.live:
             topic = args.joint_topic or DEFAULT_TOPIC
-            source = stack.enter_context(LiveJoints(chains, topic))
+            source = stack.enter_context(live_joints(chains, topic))
         server = stack.enter_context(running_server(args.host, args.port))
         viewer = Viewer(server, chains, source)
         _announce(chains, args, server.get_port())
@@ -94,18 +95,14 @@ def _recording(path: Path, chains: Sequence[Chain], topic: str | None
     """Return the chains that a recording moves, and the recording."""
     if not path.exists():
         raise InputFileError(str(path), 'there is no such file or directory')
-    if path.suffix.lower() == '.csv':
-        if topic is not None:
-            raise LegFKError(f'--joint-topic: {path} is a CSV file, which has no topics')
-        joints = [name for chain in chains for name in chain.joint_names]
-        recording = read_csv(path, dict.fromkeys(joints))
-        tracks = [recording.track(chain) for chain in chains]
-    else:
-        tracks, poseless = read_bag(path, chains, topic)
-        for words in poseless:
-            print(f'leg_fk: note: not shown: {words}', file=sys.stderr)
-    recorded = [RecordedChain(track.chain, track.times, track.positions) for track in tracks]
-    return [track.chain for track in tracks], Recording(recorded)
+    with shown_progress(path.name) as progress:
+        reading = read_tracks(path, chains, topic, progress)
+    for kind, lines in (('warning', reading.warnings), ('note', reading.notes)):
+        for line in lines:
+            print(f'leg_fk: {kind}: {line}', file=sys.stderr)
+    recorded = [RecordedChain(track.chain, track.times, track.positions)
+                for track in reading.tracks]
+    return [track.chain for track in reading.tracks], Recording(recorded)
 
 
 def _announce(chains: Sequence[Chain], args: argparse.Namespace, port: int) -> None:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from threading import Lock, Thread
 import time
-from types import TracebackType
 from typing import Any
 
 from icub_leg_fk.errors import LegFKError, MissingDependencyError
@@ -13,16 +13,18 @@ from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.stream.configuration import DEFAULT_TIMEOUT
 from icub_leg_fk.stream.joint_input import JointInput
+from icub_leg_fk.stream.notes import Note, notes_of
 from icub_leg_fk.tools.viewer_page import Changed, Posture
 import numpy as np
 
 DEFAULT_TOPIC = 'joint_states'
 _DEPTH = 100
+_LOOK_PERIOD = 1.0  # s
 _NO_TRAIL = np.zeros((0, 3))
 
 
 class LiveJoints:
-    """Moves the chains as joint states say, by the node's own rules, until it is left.
+    """Moves the chains as joint states say, by the node's own rules.
 
     Args:
         chains: the chains.
@@ -32,84 +34,105 @@ class LiveJoints:
     is_moving = True
 
     def __init__(self, chains: Sequence[Chain], topic: str) -> None:
-        self._input = JointInput(chains, DEFAULT_TIMEOUT, time.time_ns)
-        self._newest: dict[int, tuple[Sequence[float], float]] = {}  # q, and when it came [s]
-        self._lock = Lock()
         self._topic = topic
-        self._start()
+        self._input = JointInput(time.time_ns)
+        self._input.configure(chains, DEFAULT_TIMEOUT)
+        self._newest: dict[str, tuple[Sequence[float], float]] = {}  # q, and when it came [s]
+        self._notes: list[Note] = []
+        self._looked = time.monotonic()
+        self._lock = Lock()
 
-    def _start(self) -> None:
-        """Subscribe, and take messages in a thread of its own."""
-        try:
-            import rclpy
-            from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-            from rclpy.qos import QoSProfile, QoSReliabilityPolicy
-            from rclpy.signals import SignalHandlerOptions
-            from sensor_msgs.msg import JointState
-        except ImportError as error:
-            raise MissingDependencyError('rclpy', 'view --live', 'source ROS 2, or pip install '
-                                         'icub_leg_fk[ros]') from error
-        self._context = rclpy.Context()
-        best_effort = QoSProfile(depth=_DEPTH, reliability=QoSReliabilityPolicy.BEST_EFFORT)
-        try:
-            rclpy.init(args=[], context=self._context,
-                       signal_handler_options=SignalHandlerOptions.NO)
-            self._node = rclpy.create_node(
-                'leg_fk_view', context=self._context, use_global_arguments=False,
-                enable_rosout=False, start_parameter_services=False)
-            self._node.create_subscription(JointState, self._topic, self._take, best_effort,
-                                           raw=True)
-        except (RuntimeError, ValueError) as error:  # what rclpy raises for what rcl refuses
-            self._context.try_shutdown()
-            raise LegFKError(f'--live: {" ".join(str(error).split())}') from error
-        executor = SingleThreadedExecutor(context=self._context)
-        executor.add_node(self._node)
-
-        def spin() -> None:
-            try:
-                executor.spin()
-            except ExternalShutdownException:
-                pass
-
-        self._thread = Thread(target=spin, daemon=True)
-        self._thread.start()
-
-    def __enter__(self) -> LiveJoints:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 traceback: TracebackType | None) -> None:
-        self._context.try_shutdown()
-        self._thread.join()
-        self._node.destroy_node()
+    def take(self, data: bytes) -> None:
+        """Take a serialized JointState."""
+        now = time.monotonic()
+        with self._lock:
+            for ready in self._input.feed(data):
+                self._newest[ready.chain.name] = ready.positions, now
 
     def add_controls(self, gui: Any, changed: Changed) -> None:
         """Say in the page what moves the chains."""
-        gui.add_markdown(f'live: `{self._topic}`')
+        gui.add_markdown(f'live from `{self._topic}`')
 
     def advance(self) -> None:
-        """Do nothing: messages are taken as they come."""
+        """Look once a second at what there is to say of the messages."""
+        now = time.monotonic()
+        if now < self._looked + _LOOK_PERIOD:
+            return
+        self._looked = now
+        with self._lock:
+            look = self._input.take_look()
+        self._notes = notes_of(look, self._topic)
+        if not look.messages:
+            self._notes = [Note('no_message', '', '', f'no message on {self._topic}')]
 
     def postures(self) -> list[Posture]:
         """Return the joints of every chain as they came last."""
         with self._lock:
             newest = dict(self._newest)
-        return [self._posture(chain, newest) for chain in range(len(self._input.chains))]
+        return [self._posture(chain, *newest.get(chain.name, (None, 0.0)))
+                for chain in self._input.chains]
 
     def trails(self) -> list[Array]:
-        """Return no places: only a recording's trails are drawn."""
+        """Return no places: only the trails of a recording are drawn."""
         return [_NO_TRAIL] * len(self._input.chains)
 
-    def _posture(self, chain: int, newest: dict[int, tuple[Sequence[float], float]]) -> Posture:
-        if chain not in newest:
-            return Posture(None, f'no pose yet from {self._topic}')
-        q, came = newest[chain]
+    def _posture(self, chain: Chain, q: Sequence[float] | None, came: float) -> Posture:
         age = time.monotonic() - came
-        return Posture(q, f'no pose for {age:.1f} s' if age > DEFAULT_TIMEOUT else '')
+        if q is not None and age <= DEFAULT_TIMEOUT:
+            return Posture(q)
+        words = ['no pose yet' if q is None else f'no pose for {age:.1f} s']
+        words += [note.text for note in self._notes if note.chain in ('', chain.name)]
+        return Posture(q, '; '.join(words))
 
-    def _take(self, data: bytes) -> None:
-        """Take a serialized JointState."""
-        now = time.monotonic()
-        with self._lock:
-            for ready in self._input.feed(data):
-                self._newest[ready.chain] = ready.positions, now
+
+@contextmanager
+def live_joints(chains: Sequence[Chain], topic: str) -> Iterator[LiveJoints]:
+    """Follow the joint states of a topic while it lasts.
+
+    Raises:
+        MissingDependencyError: rclpy is not installed.
+        LegFKError: ROS 2 cannot be started, or the topic has no such name.
+    """
+    rclpy, joint_state = _import_rclpy()
+    joints = LiveJoints(chains, topic)
+    context = rclpy.context.Context()
+    quality = rclpy.qos.QoSProfile(
+        depth=_DEPTH, reliability=rclpy.qos.QoSReliabilityPolicy.BEST_EFFORT)
+    try:
+        rclpy.init(args=[], context=context,
+                   signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
+        node = rclpy.create_node('leg_fk_view', context=context, use_global_arguments=False,
+                                 enable_rosout=False, start_parameter_services=False)
+        node.create_subscription(joint_state, topic, joints.take, quality, raw=True)
+    except (RuntimeError, ValueError) as error:  # what rclpy raises for what rcl refuses
+        context.try_shutdown()
+        raise LegFKError(f'--live: {" ".join(str(error).split())}') from error
+    executor = rclpy.executors.SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+
+    def spin() -> None:
+        with suppress(rclpy.executors.ExternalShutdownException):
+            executor.spin()
+
+    thread = Thread(target=spin)
+    thread.start()
+    try:
+        yield joints
+    finally:
+        context.try_shutdown()
+        thread.join()
+        node.destroy_node()
+
+
+def _import_rclpy() -> tuple[Any, Any]:
+    """Return rclpy and JointState."""
+    try:
+        import rclpy.context
+        import rclpy.executors
+        import rclpy.qos
+        import rclpy.signals
+        from sensor_msgs.msg import JointState
+    except ImportError as error:
+        raise MissingDependencyError(
+            'rclpy', 'view --live', 'source ROS 2, or pip install "icub_leg_fk[ros]"') from error
+    return rclpy, JointState

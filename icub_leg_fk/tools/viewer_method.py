@@ -13,6 +13,7 @@ from fractions import Fraction
 import math
 import re
 
+from icub_leg_fk.kinematics.chain_text import short
 from icub_leg_fk.kinematics.rotation import Array, turns_about
 from icub_leg_fk.tools import text
 from icub_leg_fk.tools.drawing import AXIS_COLORS
@@ -217,7 +218,7 @@ class Method:
     def _vectors(self, letter: str, column: int, remarks: Sequence[str]) -> list[str]:
         """Return a line for one column of every frame, with a remark."""
         scale = 1000.0 if column == 3 else 1.0
-        cells = [[text.short(scale * value) for value in T[:3, column]] for T in self.frames]
+        cells = [[short(scale * value) for value in T[:3, column]] for T in self.frames]
         rows = []
         for i, (vector, remark) in enumerate(zip(text.matrix(cells, '  '), remarks, strict=True)):
             rows.append([f'{letter}_{i}', f'({vector[1:-1]})', remark])
@@ -242,7 +243,7 @@ class Method:
             return 'the last row puts it there'
         link = self.rows[row].link
         other = f'z_{i + 1 if self._is_modified else i - 1}'
-        length = text.short(1000 * abs(link.a))
+        length = short(1000 * abs(link.a))
         is_parallel = abs(math.sin(link.alpha)) < _NOTHING
         if abs(link.a) < _NOTHING:
             return f'on {other}' if is_parallel else f'meets {other}'
@@ -259,7 +260,7 @@ class Method:
         values = text.columns([
             [f'theta_{row}', f'= {theta} deg', f'about z_{z}, x_{row} to x_{following}'],
             [f'd_{row}', f'= {d}', f'along z_{z}'],
-            [f'a_{row}', f'= {text.short(1000 * geometry.a)}', f'along x_{x}'],
+            [f'a_{row}', f'= {short(1000 * geometry.a)}', f'along x_{x}'],
             [f'alpha_{row}', f'= {_in_pi(geometry.alpha)}',
              f'about x_{x}, z_{row} to z_{following}']])
         factors = [f'Rz(theta_{row}) tz(d_{row})', f'tx(a_{row}) Rx(alpha_{row})']
@@ -274,10 +275,10 @@ class Method:
         link = self.rows[row].link
         theta, d = math.degrees(geometry.theta), 1000 * geometry.d
         if link.is_fixed:
-            return text.short(theta), text.short(d)
+            return short(theta), short(d)
         if link.is_prismatic:
-            return text.short(theta), _sum(1000 * link.d, d)
-        return _sum(math.degrees(link.offset), theta), text.short(d)
+            return short(theta), _sum(1000 * link.d, d)
+        return _sum(math.degrees(link.offset), theta), short(d)
 
     def _product_lines(self) -> list[str]:
         m = len(self.rows)
@@ -305,7 +306,7 @@ def matrix_in_mm(T: Array) -> list[str]:
     """Return the lines of a transform with its translation in mm."""
     shown = T.copy()
     shown[:3, 3] *= 1000.0
-    cells = [[text.short(value) for value in row] for row in shown[:3].tolist()]
+    cells = [[short(value) for value in row] for row in shown[:3].tolist()]
     return text.matrix([*cells, ['0', '0', '0', '1']], '  ')
 
 
@@ -313,7 +314,7 @@ def _length_scene(name: str, length: float, ends: Array, color: str) -> Scene:
     """Return a length [m] with its name and value; nothing if it is 0."""
     if abs(length) < _NOTHING:
         return {}
-    words = f'{name} = {text.short(1000 * length)}'
+    words = f'{name} = {short(1000 * length)}'
     return {f'method/{name}': polyline(ends, color, 7.0),
             f'method/{name} value': Label(words, ends.mean(axis=0))}
 
@@ -324,7 +325,7 @@ def _angle_scene(name: str, angle: float, center: Array, points: Array, color: s
         return {}
     sides = np.stack((points[0], center, points[-1]))
     beside = center + 1.25 * (points[len(points) // 2] - center)
-    words = f'{name} = {text.short(math.degrees(angle))} deg'
+    words = f'{name} = {short(math.degrees(angle))} deg'
     return {f'method/{name}': polyline(points, color, 5.0),
             f'method/{name} sides': polyline(sides, color, 1.5),
             f'method/{name} value': Label(words, beside)}
@@ -332,9 +333,9 @@ def _angle_scene(name: str, angle: float, center: Array, points: Array, color: s
 
 def _sum(constant: float, total: float) -> str:
     """Return `90 - 30 = 60`."""
-    moved = text.short(total - constant)
+    moved = short(total - constant)
     sign = '-' if moved.startswith('-') else '+'
-    return f'{text.short(constant)} {sign} {moved.lstrip("-")} = {text.short(total)}'
+    return f'{short(constant)} {sign} {moved.lstrip("-")} = {short(total)}'
 
 
 def _in_pi(angle: float) -> str:

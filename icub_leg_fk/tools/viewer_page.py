@@ -12,7 +12,7 @@ import socket
 from typing import Any, NamedTuple
 
 from icub_leg_fk.errors import LegFKError, MissingDependencyError
-from icub_leg_fk.kinematics import Chain, DHLink
+from icub_leg_fk.kinematics import Chain, chain_text, DHLink
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.tools import text
 from icub_leg_fk.tools.signals import held_signals
@@ -235,11 +235,11 @@ def _shown_limits(link: DHLink) -> tuple[float, float]:
 def _range_line(link: DHLink, position: float) -> str:
     """Return the line below a slider, as HTML."""
     lower, upper = link.limits
-    allowed = text.joint_range(link)
+    allowed = chain_text.joint_range(link)
     if lower <= position <= upper:
         words, color = f'range {allowed}' if allowed else 'no range', _GREY
     else:
-        words, color = f'{text.position(link, position)} is outside {allowed}', _RED
+        words, color = f'{chain_text.position(link, position)} is outside {allowed}', _RED
     return f'<div style="{_SMALL};margin-top:-6px;color:{color}">{html.escape(words)}</div>'
 
 
