@@ -113,7 +113,7 @@ def _announce(chains: Sequence[Chain], args: argparse.Namespace, port: int) -> N
     if args.host in _EVERY_ADDRESS:
         host = '127.0.0.1'
     address = f'http://{host}:{port}/'
-    names = ', '.join(f'{chain.name} {chain.version}' for chain in chains)
+    names = ', '.join(f'{chain.name}={chain.version}' for chain in chains)
     root = chains[0]
     where = f' ({", ".join(axis_names(root))})' if root.root_axes else ''
     print(f'{names} in {root.root_frame}{where}\n{address}   (Ctrl-C ends it)', flush=True)

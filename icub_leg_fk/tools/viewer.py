@@ -150,7 +150,7 @@ class Viewer:
 
     def _add_panel(self, gui: Any) -> None:
         """Add the panel of the poses and the method."""
-        self._names = [f'{chain.name} {chain.version}' for chain in self._chains]
+        self._names = [f'{chain.name}={chain.version}' for chain in self._chains]
         panel = gui.add_panel()
         with panel.add_tab('Poses'):
             root = self._chains[0]

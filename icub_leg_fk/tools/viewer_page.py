@@ -166,7 +166,7 @@ class JointSliders:
         self._sliders: dict[str, Any] = {}
         self._lines: dict[str, Any] = {}
         for chain in chains:
-            with gui.add_folder(f'{chain.name} {chain.version}'):
+            with gui.add_folder(f'{chain.name}={chain.version}'):
                 for name, link in zip(chain.joint_names, chain.joints, strict=True):
                     if name not in self._links:
                         self._add(name, link)

@@ -183,7 +183,7 @@ def test_the_page_is_opened_and_its_address_printed(monkeypatch):
         done = run_main('view', '--port', port)
     about, address = done.stdout.splitlines()
     assert done.returncode == 0
-    assert about == 'left_leg v2_5, right_leg v2_5 in root_link (x backward, y right, z up)'
+    assert about == 'left_leg=v2_5, right_leg=v2_5 in root_link (x backward, y right, z up)'
     assert address.split()[0] == opened[0] != f'http://127.0.0.1:{port}/'
     assert f'note: port {port} is taken' in done.stderr
 
@@ -231,13 +231,14 @@ def test_a_live_robot_moves_the_chains():
 
 # What is drawn, and said, without a page.
 
-ends = pytest.mark.parametrize('name', ['left_leg', 'right_leg', 'panda', 'arm'])
+FILES = {'panda': EXAMPLES / 'panda.yaml', 'arm': EXAMPLES / 'cylindrical_arm.yaml'}
+
+each_kind = pytest.mark.parametrize('name', ['left_leg', 'right_leg', 'panda', 'arm'])
 
 
 def example(name):
     """Return a chain: standard, modified, or with slides."""
-    files = {'panda': EXAMPLES / 'panda.yaml', 'arm': EXAMPLES / 'cylindrical_arm.yaml'}
-    return load_chain(name, file=files.get(name))
+    return load_chain(name, file=FILES.get(name))
 
 
 @settings(max_examples=40)
@@ -273,7 +274,7 @@ def test_a_row_of_a_modified_table_has_its_normal_first():
         np.testing.assert_allclose(path[3] - path[2], geometry.d * after[:3, 2], atol=1e-12)
 
 
-@ends
+@each_kind
 def test_each_step_draws_what_it_is_about(name):
     chain = example(name)
     method = Method(PosedChain(chain, [0.3] * chain.n), 1.0)
@@ -287,7 +288,7 @@ def test_each_step_draws_what_it_is_about(name):
     assert 'method/tip' in scenes[5]
 
 
-@ends
+@each_kind
 def test_the_product_is_the_pose_in_mm(name):
     chain = example(name)
     q = [0.3] * chain.n
@@ -298,7 +299,33 @@ def test_the_product_is_the_pose_in_mm(name):
     np.testing.assert_allclose(shown, expected, atol=5.1e-5)
 
 
-@ends
+@each_kind
+def test_the_steps_have_the_numbers_of_explain(name):
+    chain = example(name)
+    q = [0.3] * chain.n
+    file = ['-k', FILES[name]] if name in FILES else []
+    explained = run_main('explain', name, *file, '--radians', *q).stdout
+    method = Method(PosedChain(chain, q), 1.0)
+    said = '\n'.join(line for step in range(1, 5) for line in method.lines(step, 0))
+    vectors = named_vectors(said)
+    assert len(vectors) == 4 * len(method.frames)
+    assert vectors.items() <= named_vectors(explained).items()
+    for line in method.lines(6, 0)[-4:]:
+        assert line.split() in [printed.split() for printed in bracketed(explained)]
+
+
+def named_vectors(text):
+    """Return vectors such as `z_2 = (0 0.1736 0.9848)` by their names."""
+    found = re.findall(r'^ *([zoxy]_\d+) *=? *\(([^)]*)\)', text, re.MULTILINE)
+    return {name: tuple(numbers.split()) for name, numbers in found}
+
+
+def bracketed(text):
+    """Return the rows of the matrices in a text."""
+    return re.findall(r'\[[^][]*\]', text)
+
+
+@each_kind
 def test_the_rows_multiply_to_the_table(name):
     chain = example(name)
     posed = PosedChain(chain, [0.3] * chain.n)
