@@ -33,7 +33,7 @@ examples:
   leg_fk view --live"""
 
 _HIGHEST_PORT = 64535  # viser tries the next thousand, too
-_EVERY_ADDRESS = ('', '0.0.0.0', '::')
+_EVERY_ADDRESS = ('0.0.0.0', '::')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -63,13 +63,13 @@ def run(args: argparse.Namespace) -> int:
         raise LegFKError('--joint-topic goes with --recording or --live')
     chains = _chosen_chains(args)
     with ExitStack() as stack:
+        server = stack.enter_context(running_server(args.host, args.port))
         source: Source | None = None
         if args.recording:
             chains, source = _recording(args.recording, chains, args.joint_topic)
         elif args.live:
             topic = args.joint_topic or DEFAULT_TOPIC
             source = stack.enter_context(live_joints(chains, topic))
-        server = stack.enter_context(running_server(args.host, args.port))
         viewer = Viewer(server, chains, source)
         _announce(chains, args, server.get_port())
         viewer.run()

@@ -104,9 +104,13 @@ def live_joints(chains: Sequence[Chain], topic: str) -> Iterator[LiveJoints]:
         node = rclpy.create_node('leg_fk_view', context=context, use_global_arguments=False,
                                  enable_rosout=False, start_parameter_services=False)
         node.create_subscription(joint_state, topic, joints.take, quality, raw=True)
+    except rclpy.exceptions.InvalidTopicNameException as error:
+        context.try_shutdown()
+        reason = str(error).splitlines()[0].rstrip(':').partition(': ')[2]
+        raise LegFKError(f'--joint-topic: found {topic!r}; {reason}') from error
     except (RuntimeError, ValueError) as error:  # what rclpy raises for what rcl refuses
         context.try_shutdown()
-        raise LegFKError(f'--live: {" ".join(str(error).split())}') from error
+        raise LegFKError(f'ROS 2 cannot be started: {" ".join(str(error).split())}') from error
     executor = rclpy.executors.SingleThreadedExecutor(context=context)
     executor.add_node(node)
 
@@ -128,6 +132,7 @@ def _import_rclpy() -> tuple[Any, Any]:
     """Return rclpy and JointState."""
     try:
         import rclpy.context
+        import rclpy.exceptions
         import rclpy.executors
         import rclpy.qos
         import rclpy.signals

@@ -218,7 +218,7 @@ class Method:
     def _vectors(self, letter: str, column: int, remarks: Sequence[str]) -> list[str]:
         """Return a line for one column of every frame, with a remark."""
         scale = 1000.0 if column == 3 else 1.0
-        cells = [[short(scale * value) for value in T[:3, column]] for T in self.frames]
+        cells = [_numbers(scale * T[:3, column]) for T in self.frames]
         rows = []
         for i, (vector, remark) in enumerate(zip(text.matrix(cells, '  '), remarks, strict=True)):
             rows.append([f'{letter}_{i}', f'({vector[1:-1]})', remark])
@@ -306,8 +306,11 @@ def matrix_in_mm(T: Array) -> list[str]:
     """Return the lines of a transform with its translation in mm."""
     shown = T.copy()
     shown[:3, 3] *= 1000.0
-    cells = [[short(value) for value in row] for row in shown[:3].tolist()]
-    return text.matrix([*cells, ['0', '0', '0', '1']], '  ')
+    return text.matrix([*map(_numbers, shown[:3]), ['0', '0', '0', '1']], '  ')
+
+
+def _numbers(values: Array) -> list[str]:
+    return [short(value) for value in values.tolist()]
 
 
 def _length_scene(name: str, length: float, ends: Array, color: str) -> Scene:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 import html
 from importlib import import_module
@@ -23,6 +23,7 @@ _BEYOND = 0.2  # of a range; so far beyond it a slider goes
 _BOUNDS = {'revolute': (-180.0, 180.0), 'prismatic': (-1.0, 1.0)}  # deg or m, without a range
 _STEP = {'revolute': 0.1, 'prismatic': 0.001}  # deg or m
 _ROUND = {'revolute': 1.0, 'prismatic': 0.01}  # deg or m; a slider's ends are multiples of it
+_ROUNDING = 1e-9  # rad or m; from degrees and back
 
 _GREY, _RED = '#777777', '#d00000'
 _SMALL = 'font-size:11px;line-height:1.2;padding:0 8px'
@@ -236,7 +237,7 @@ def _range_line(link: DHLink, position: float) -> str:
     """Return the line below a slider, as HTML."""
     lower, upper = link.limits
     allowed = chain_text.joint_range(link)
-    if lower <= position <= upper:
+    if lower - _ROUNDING <= position <= upper + _ROUNDING:
         words, color = f'range {allowed}' if allowed else 'no range', _GREY
     else:
         words, color = f'{chain_text.position(link, position)} is outside {allowed}', _RED
@@ -268,14 +269,16 @@ def _div(words: str, color: str) -> str:
 def tip_texts(posed: PosedChain) -> dict[str, list[str]]:
     """Return the pose of a chain's tip in texts by title, in the numbers of `leg_fk pose`."""
     T = posed.frames[-1]
-    xyz = [text.fixed(value, 7) for value in T[:3, 3]]
-    xyzw = [text.fixed(value, 7) for value in posed.chain.pose(posed.q)[3:]]
-    angles = [text.fixed(math.degrees(angle), 4) for angle in roll_pitch_yaw(T[:3, :3])]
-    cells = [[text.fixed(value, 7) for value in row] for row in T[:3].tolist()]
-    return {'position (m)': [_named('xyz', xyz)],
-            'quaternion': [_named('xyzw', xyzw)],
-            'roll, pitch, yaw (deg)': [_named(('roll', 'pitch', 'yaw'), angles)],
-            'matrix (translation in m)': text.matrix([*cells, ['0', '0', '0', '1']], '  ')}
+    angles = np.degrees(roll_pitch_yaw(T[:3, :3]))
+    matrix = [*map(_numbers, T[:3]), ['0', '0', '0', '1']]
+    return {'position (m)': [_named('xyz', _numbers(T[:3, 3]))],
+            'quaternion': [_named('xyzw', _numbers(posed.chain.pose(posed.q)[3:]))],
+            'roll, pitch, yaw (deg)': [_named(('roll', 'pitch', 'yaw'), _numbers(angles, 4))],
+            'matrix (translation in m)': text.matrix(matrix, '  ')}
+
+
+def _numbers(values: Iterable[float], decimals: int = 7) -> list[str]:
+    return [text.fixed(value, decimals) for value in values]
 
 
 def _named(names: Sequence[str], values: Sequence[str]) -> str:

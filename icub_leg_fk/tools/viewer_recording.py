@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 import time
 from typing import Any
 
@@ -55,46 +55,50 @@ class RecordedChain:
 
 
 class Recording:
-    """Moves the chains as they were recorded, in the time of its clock.
+    """Moves the chains as they were recorded.
 
     Args:
         tracks: what each chain did.
-        clock: returns the present time [s].
     """
 
-    def __init__(self, tracks: Sequence[RecordedChain],
-                 clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, tracks: Sequence[RecordedChain]) -> None:
         self._tracks = tuple(tracks)
-        self._clock = clock
         self._start = min(float(track.times[0]) for track in tracks)
         self._end = max(float(track.times[-1]) for track in tracks)
         self._at = self._start
-        self._played = clock()
+        self._advanced = time.monotonic()
+        self._is_pressed = False
         self.is_moving = False
 
     def add_controls(self, gui: Any, changed: Changed) -> None:
         """Add the time line, pause and speed to the page."""
+        def press(event: Any) -> None:
+            self._is_pressed = True
+            changed(event)
+
         with gui.add_folder('recording'):
             self._line = gui.add_slider('time [s]', self._start, self._end, 0.01, self._start)
             self._speed = gui.add_dropdown('speed', _SPEEDS, initial_value='1')
             self._button = gui.add_button('play')
         self._shown = self._line.value
         self._line.on_update(changed)
-        self._button.on_click(self._press)
-        self._button.on_click(changed)
+        self._button.on_click(press)
 
     def advance(self) -> None:
         """Go on to the present time, or to where the time line was moved."""
-        now = self._clock()
-        passed, self._played = now - self._played, now
+        now = time.monotonic()
+        passed, self._advanced = now - self._advanced, now
         if self._line.value != self._shown:
             self._at = float(self._line.value)
-            self._pause()
+            self._play(False)
         elif self.is_moving:
-            self._at += passed * float(self._speed.value)
-        if self._at >= self._end:
-            self._at = self._end
-            self._pause()
+            self._at = min(self._at + passed * float(self._speed.value), self._end)
+        if self._is_pressed:
+            self._is_pressed = False
+            self._at = self._start if self._at >= self._end else self._at
+            self._play(not self.is_moving)
+        elif self._at >= self._end:
+            self._play(False)
         self._shown = self._line.value = self._at
 
     def postures(self) -> list[Posture]:
@@ -105,18 +109,6 @@ class Recording:
         """Return the last places of every tip, (N, 3) each."""
         return [track.trail(self._at) for track in self._tracks]
 
-    def _press(self, _: Any) -> None:
-        """Pause, or go on; after the end from the beginning."""
-        if self.is_moving:
-            self._pause()
-            return
-        if self._at >= self._end:
-            self._at = self._start
-            self._shown = self._line.value = self._at
-        self._played = self._clock()
-        self.is_moving = True
-        self._button.label = 'pause'
-
-    def _pause(self) -> None:
-        self.is_moving = False
-        self._button.label = 'play'
+    def _play(self, is_moving: bool) -> None:
+        self.is_moving = is_moving
+        self._button.label = 'pause' if is_moving else 'play'

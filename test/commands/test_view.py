@@ -16,11 +16,12 @@ from hypothesis import strategies as st
 from icub_leg_fk.kinematics import Chain, DHLink, load_chain
 from icub_leg_fk.kinematics.rotation import turns_about
 from icub_leg_fk.tools.viewer import Viewer
-from icub_leg_fk.tools.viewer_live import live_joints
+from icub_leg_fk.tools.viewer_live import live_joints, LiveJoints
 from icub_leg_fk.tools.viewer_method import arc, Method, STEPS
 from icub_leg_fk.tools.viewer_page import (
     Posture,
     roll_pitch_yaw,
+    running_server,
     slider_bounds,
     slider_start,
 )
@@ -188,6 +189,22 @@ def test_the_page_is_opened_and_its_address_printed(monkeypatch):
     assert f'note: port {port} is taken' in done.stderr
 
 
+def test_the_page_is_updated_at_most_30_times_a_second(monkeypatch):
+    pytest.importorskip('viser')
+    times = []
+
+    def refresh(viewer):
+        times.append(time.monotonic())
+        if len(times) == 7:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Viewer, 'refresh', refresh)
+    chain = load_chain('left_leg')
+    with running_server('127.0.0.1', 0) as server, pytest.raises(KeyboardInterrupt):
+        Viewer(server, [chain], LiveJoints([chain], 'joint_states')).run()
+    assert times[-1] - times[0] > 6 / 30 - 1e-3
+
+
 @pytest.mark.parametrize(('words', 'complaint'), [
     (['--host', '192.0.2.1'], "--host: found '192.0.2.1'"),
     (['--port', '99999'], "found '99999', allowed: 1 to"),
@@ -208,6 +225,12 @@ def test_a_missing_library_is_named_with_its_mend(monkeypatch, library, words, i
     monkeypatch.setitem(sys.modules, library, None)
     done = run_main('view', *words)
     assert_one_line_complaint(done, f'needs {library}, which is not installed: {install}')
+
+
+def test_a_topic_with_no_such_name_is_refused():
+    pytest.importorskip('rclpy')
+    done = run_main('view', '--live', '--joint-topic', '/joint states')
+    assert_one_line_complaint(done, "--joint-topic: found '/joint states'; topic name must not")
 
 
 def test_a_live_robot_moves_the_chains():
@@ -241,7 +264,7 @@ def example(name):
     return load_chain(name, file=FILES.get(name))
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(chains_and_positions())
 def test_a_row_leads_from_frame_to_frame_along_z_and_the_common_normal(chain_and_positions):
     chain, (q, *_) = chain_and_positions
