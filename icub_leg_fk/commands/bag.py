@@ -44,49 +44,96 @@ class _Task(NamedTuple):
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.usage = ('leg_fk bag IN OUT [options]\n'
-                    '       leg_fk bag IN... --out-dir DIR [--jobs N] [options]')
-    parser.add_argument('bags', metavar='BAG', nargs='+', help='the bag to read and the bag to '
-                        'make; with --out-dir, all are bags to read')
-    parser.add_argument('--out-dir', metavar='DIR', help='where each gets one of the same name')
-    parser.add_argument('--jobs', metavar='N', type=_positive_integer, default=1,
-                        help='bags to work on at a time (default: 1)')
-    options.add(parser, '--chains', '--version', '--foot-frame', '--joint-topic',
-                '--kinematics-file', '--force')
-    parser.add_argument('--frame-prefix', metavar='PREFIX', default='',
-                        help='put before every frame id')
-    parser.add_argument('--joint-timeout', metavar='S', type=float, default=DEFAULT_TIMEOUT,
-                        help='age of a joint beside the newest of its chain above which there is '
-                             f'no pose; 0 turns this off (default: {DEFAULT_TIMEOUT})')
-    parser.add_argument('--storage', metavar='{mcap,sqlite3}', choices=('mcap', 'sqlite3'),
-                        help='storage of the new bag (default: as OUT says, or as in the old one)')
-    parser.add_argument('--twist', action='store_true',
-                        help='also add the velocities of the tips, from the joint velocities')
+    parser.usage = (
+        'leg_fk bag IN OUT [options]\n'
+        '       leg_fk bag IN... --out-dir DIR [--jobs N] [options]'
+    )
+    parser.add_argument(
+        'bags',
+        metavar='BAG',
+        nargs='+',
+        help='the bag to read and the bag to '
+        'make; with --out-dir, all are bags to read',
+    )
+    parser.add_argument(
+        '--out-dir', metavar='DIR', help='where each gets one of the same name'
+    )
+    parser.add_argument(
+        '--jobs',
+        metavar='N',
+        type=_positive_integer,
+        default=1,
+        help='bags to work on at a time (default: 1)',
+    )
+    options.add(
+        parser,
+        '--chains',
+        '--version',
+        '--foot-frame',
+        '--joint-topic',
+        '--kinematics-file',
+        '--force',
+    )
+    parser.add_argument(
+        '--frame-prefix', metavar='PREFIX', default='', help='put before every frame id'
+    )
+    parser.add_argument(
+        '--joint-timeout',
+        metavar='S',
+        type=float,
+        default=DEFAULT_TIMEOUT,
+        help='age of a joint beside the newest of its chain above which there is '
+        f'no pose; 0 turns this off (default: {DEFAULT_TIMEOUT})',
+    )
+    parser.add_argument(
+        '--storage',
+        metavar='{mcap,sqlite3}',
+        choices=('mcap', 'sqlite3'),
+        help='storage of the new bag (default: as OUT says, or as in the old one)',
+    )
+    parser.add_argument(
+        '--twist',
+        action='store_true',
+        help='also add the velocities of the tips, from the joint velocities',
+    )
     parser.add_argument('--tf', action='store_true', help='also add the poses to /tf')
-    parser.add_argument('--only-poses', action='store_true',
-                        help='leave out everything but what is added')
-    parser.add_argument('--replace-poses', action='store_true',
-                        help='leave out the poses that the bag has already')
+    parser.add_argument(
+        '--only-poses',
+        action='store_true',
+        help='leave out everything but what is added',
+    )
+    parser.add_argument(
+        '--replace-poses',
+        action='store_true',
+        help='leave out the poses that the bag has already',
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Convert the bags."""
     tasks = _tasks(args)
     given = {name: value for name, value in vars(args).items() if value is not None}
-    settings = {name: given[name] for name in signature(add_foot_poses).parameters.keys() & given}
+    settings = {
+        name: given[name]
+        for name in signature(add_foot_poses).parameters.keys() & given
+    }
     failed = False
     for task, outcome in _outcomes(tasks, settings, args.jobs):
         if isinstance(outcome, Summary):
             print('\n'.join(_summary_lines(outcome)), flush=True)
         else:
             failed = True
-            print(f'leg_fk: error: {_fault(task, outcome, len(tasks))}', file=sys.stderr,
-                  flush=True)
+            print(
+                f'leg_fk: error: {_fault(task, outcome, len(tasks))}',
+                file=sys.stderr,
+                flush=True,
+            )
     return 2 if failed else 0
 
 
-def _outcomes(tasks: Sequence[_Task], settings: Mapping[str, Any], jobs: int
-              ) -> Iterator[tuple[_Task, Summary | LegFKError]]:
+def _outcomes(
+    tasks: Sequence[_Task], settings: Mapping[str, Any], jobs: int
+) -> Iterator[tuple[_Task, Summary | LegFKError]]:
     """Yield each task with what came of it, some worked on at a time."""
     if jobs > 1 and len(tasks) > 1:
         yield from _outcomes_of_jobs(tasks, settings, min(jobs, len(tasks)))
@@ -97,8 +144,9 @@ def _outcomes(tasks: Sequence[_Task], settings: Mapping[str, Any], jobs: int
         yield task, outcome
 
 
-def _outcomes_of_jobs(tasks: Sequence[_Task], settings: Mapping[str, Any], jobs: int
-                      ) -> Iterator[tuple[_Task, Summary | LegFKError]]:
+def _outcomes_of_jobs(
+    tasks: Sequence[_Task], settings: Mapping[str, Any], jobs: int
+) -> Iterator[tuple[_Task, Summary | LegFKError]]:
     """Yield each task with what came of it, in the order in which they are done."""
     pool = ProcessPoolExecutor(jobs, get_context('spawn'), _begin_worker)
     try:
@@ -140,7 +188,9 @@ def _tasks(args: argparse.Namespace) -> list[_Task]:
     return [_Task(*args.bags)]
 
 
-def _tasks_of_directory(bags: Sequence[str], directory: str, storage: str) -> list[_Task]:
+def _tasks_of_directory(
+    bags: Sequence[str], directory: str, storage: str
+) -> list[_Task]:
     """Return tasks that make of each bag one of its name in a directory, which is made."""
     refuse_option_like(directory)
     try:
@@ -155,14 +205,18 @@ def _tasks_of_directory(bags: Sequence[str], directory: str, storage: str) -> li
             path = path.with_suffix(endings[storage])
         target = str(Path(directory, path.name))
         if target in sources:
-            raise OutputFileError(target, 'several bags would get this name; allowed: one')
+            raise OutputFileError(
+                target, 'several bags would get this name; allowed: one'
+            )
         sources[target] = bag
     return [_Task(source, target) for target, source in sources.items()]
 
 
 def _positive_integer(text: str) -> int:
     if not text.strip().isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f'found {text.strip()!r}, allowed: integers from 1 on')
+        raise argparse.ArgumentTypeError(
+            f'found {text.strip()!r}, allowed: integers from 1 on'
+        )
     return int(text)
 
 
@@ -172,17 +226,23 @@ def _fault(task: _Task, error: LegFKError, tasks: int) -> str:
     if isinstance(error, ParameterError):
         line = f'--{error.parameter.replace("_", "-")}: {error.fault}'
     line = ' '.join(line.split())
-    return line if tasks == 1 or line.startswith(task.source) else f'{task.source}: {line}'
+    return (
+        line if tasks == 1 or line.startswith(task.source) else f'{task.source}: {line}'
+    )
 
 
 def _summary_lines(summary: Summary) -> list[str]:
     """Return the closing summary, line by line."""
     rows = [(str(summary.copied), 'messages copied')]
-    rows += [(str(count), f'added on {topic}') for topic, count in summary.added.items()]
+    rows += [
+        (str(count), f'added on {topic}') for topic, count in summary.added.items()
+    ]
     lines = columns(rows)
     lines += [f'warning: {warning}' for warning in summary.warnings]
     lines += [f'note: {note}' for note in summary.notes]
     speed = summary.recorded / max(summary.took, 1e-9)
-    lines.append(f'{summary.recorded:.3f} s of recording in {summary.took:.3f} s, {speed:.1f} '
-                 'seconds of recording per second')
+    lines.append(
+        f'{summary.recorded:.3f} s of recording in {summary.took:.3f} s, {speed:.1f} '
+        'seconds of recording per second'
+    )
     return [f'{summary.source} -> {summary.target}', *indented(lines)]

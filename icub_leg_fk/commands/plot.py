@@ -39,18 +39,41 @@ _LONGEST_TIME = 1e15  # s
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument('input', metavar='INPUT', help='bag or CSV file')
-    options.add_output(parser, 'picture to write, .png, .svg or .pdf (default: the name of INPUT '
-                       'with .png, in this directory)')
-    options.add(parser, '--chains', '--version', '--foot-frame', '--joint-topic',
-                '--kinematics-file')
-    parser.add_argument('--at', metavar='T[,T...]', type=_times,
-                        help=f'up to {_INSTANTS} times [s] at which to draw the legs (default: '
-                             'where one foot is highest above the other, or farthest ahead)')
+    options.add_output(
+        parser,
+        'picture to write, .png, .svg or .pdf (default: the name of INPUT '
+        'with .png, in this directory)',
+    )
+    options.add(
+        parser,
+        '--chains',
+        '--version',
+        '--foot-frame',
+        '--joint-topic',
+        '--kinematics-file',
+    )
+    parser.add_argument(
+        '--at',
+        metavar='T[,T...]',
+        type=_times,
+        help=f'up to {_INSTANTS} times [s] at which to draw the legs (default: '
+        'where one foot is highest above the other, or farthest ahead)',
+    )
     time = options.number_between(-_LONGEST_TIME, _LONGEST_TIME, 'a time in seconds')
-    parser.add_argument('--from', dest='begin', metavar='T', type=time,
-                        help='draw only from this time [s] (default: the first pose)')
-    parser.add_argument('--to', dest='end', metavar='T', type=time,
-                        help='draw only to this time [s] (default: the last pose)')
+    parser.add_argument(
+        '--from',
+        dest='begin',
+        metavar='T',
+        type=time,
+        help='draw only from this time [s] (default: the first pose)',
+    )
+    parser.add_argument(
+        '--to',
+        dest='end',
+        metavar='T',
+        type=time,
+        help='draw only to this time [s] (default: the last pose)',
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -59,13 +82,17 @@ def run(args: argparse.Namespace) -> int:
     output = args.output or f'{Path(name).stem}.png'
     check_output(output, args.force)
     if not Path(args.input).exists():
-        raise InputFileError(args.input, 'there is no such file or directory; allowed: a bag or '
-                                         'a CSV file')
+        raise InputFileError(
+            args.input,
+            'there is no such file or directory; allowed: a bag or a CSV file',
+        )
     chains = _chosen_chains(options.load_catalog(args), args)
     with shown_progress(name) as progress:
         reading = read_tracks(args.input, chains, args.joint_topic, progress)
     tracks = _between(reading.tracks, args.begin, args.end)
-    instants = _checked_instants(args.at, tracks) if args.at else default_instants(tracks)
+    instants = (
+        _checked_instants(args.at, tracks) if args.at else default_instants(tracks)
+    )
     title = _title(name, tracks)
     save_picture(lambda: feet_figure(tracks, instants, title), output, force=args.force)
     poses = ', '.join(_pose_count(track) for track in tracks)
@@ -91,7 +118,9 @@ def default_instants(tracks: Sequence[ChainTrack]) -> list[float]:
     return [float(time) for time in np.linspace(start, end, _INSTANTS)]
 
 
-def _far_apart(one: ChainTrack, two: ChainTrack, start: float, end: float) -> list[float]:
+def _far_apart(
+    one: ChainTrack, two: ChainTrack, start: float, end: float
+) -> list[float]:
     """Return when one foot is highest above the other and farthest ahead of it, both ways [s]."""
     columns = [np.interp(one.times, two.times, two.poses[:, i]) for i in range(3)]
     apart = one.poses[:, :3] - np.stack(columns, axis=1)
@@ -117,46 +146,59 @@ def _chosen_chains(catalog: Catalog, args: argparse.Namespace) -> list[Chain]:
     chains = catalog.select(args.chains or legs or list(catalog.chains), args.version)
     roots = sorted({chain.root_frame for chain in chains})
     if len(roots) > 1:
-        raise LegFKError(f'--chains: found the root frames {", ".join(roots)}, allowed: chains of '
-                         'one root frame')
+        raise LegFKError(
+            f'--chains: found the root frames {", ".join(roots)}, allowed: chains of '
+            'one root frame'
+        )
     if args.foot_frame is None:
         return list(chains)
     return [chain.with_frame(args.foot_frame) for chain in chains]
 
 
-def _between(tracks: Sequence[ChainTrack], begin: float | None, end: float | None
-             ) -> list[ChainTrack]:
+def _between(
+    tracks: Sequence[ChainTrack], begin: float | None, end: float | None
+) -> list[ChainTrack]:
     """Return the parts of the tracks from one time to another [s]."""
     start, stop = time_span(tracks)
     begin = start if begin is None else begin
     end = stop if end is None else end
     inside = [(track.times >= begin) & (track.times <= end) for track in tracks]
     if not all(mask.any() for mask in inside):
-        raise LegFKError(f'--from, --to: found {begin:g} to {end:g} s, in which not every chain '
-                         f'has a pose; the recording goes from {start:g} to {stop:g} s')
+        raise LegFKError(
+            f'--from, --to: found {begin:g} to {end:g} s, in which not every chain '
+            f'has a pose; the recording goes from {start:g} to {stop:g} s'
+        )
     return [track.where(mask) for track, mask in zip(tracks, inside)]
 
 
-def _checked_instants(instants: Sequence[float], tracks: Sequence[ChainTrack]) -> list[float]:
+def _checked_instants(
+    instants: Sequence[float], tracks: Sequence[ChainTrack]
+) -> list[float]:
     """Return the times at which to draw the legs, in order [s]."""
     start, end = time_span(tracks)
     outside = [instant for instant in instants if not start <= instant <= end]
     if outside:
-        raise LegFKError(f'--at: found {outside[0]:g} s, allowed: {start:g} to {end:g} s')
+        raise LegFKError(
+            f'--at: found {outside[0]:g} s, allowed: {start:g} to {end:g} s'
+        )
     return sorted(instants)
 
 
 def _times(text: str) -> list[float]:
     times = [options.number(word) for word in text.split(',')]
     if len(times) > _INSTANTS or not all(map(math.isfinite, times)):
-        raise argparse.ArgumentTypeError(f'found {text.strip()!r}, allowed: up to {_INSTANTS} '
-                                         'times in seconds, separated by commas')
+        raise argparse.ArgumentTypeError(
+            f'found {text.strip()!r}, allowed: up to {_INSTANTS} '
+            'times in seconds, separated by commas'
+        )
     return times
 
 
 def _title(name: str, tracks: Sequence[ChainTrack]) -> str:
     """Return the name of the recording, if not too long, with the versions of the chains."""
-    shown = os.fsencode(name).decode(errors='backslashreplace')  # a name need not be text
+    shown = os.fsencode(name).decode(
+        errors='backslashreplace'
+    )  # a name need not be text
     if len(shown) > _LONGEST_NAME:
         shown = f'{shown[:_LONGEST_NAME]}...'
     versions = ', '.join(dict.fromkeys(track.chain.version for track in tracks))

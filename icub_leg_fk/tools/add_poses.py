@@ -80,12 +80,24 @@ class Summary:
 
 
 def add_foot_poses(
-        source: str | Path, target: str | Path, *, chains: Sequence[str] = LEGS,
-        version: str = '', kinematics_file: str | None = None, foot_frame: str = DEFAULT_FRAME,
-        frame_prefix: str = '', joint_timeout: float = DEFAULT_TIMEOUT,
-        joint_topic: str | None = None, twist: bool = False,
-        tf: bool = False, only_poses: bool = False, replace_poses: bool = False,
-        storage: str = '', force: bool = False, progress: Progress | None = None) -> Summary:
+    source: str | Path,
+    target: str | Path,
+    *,
+    chains: Sequence[str] = LEGS,
+    version: str = '',
+    kinematics_file: str | None = None,
+    foot_frame: str = DEFAULT_FRAME,
+    frame_prefix: str = '',
+    joint_timeout: float = DEFAULT_TIMEOUT,
+    joint_topic: str | None = None,
+    twist: bool = False,
+    tf: bool = False,
+    only_poses: bool = False,
+    replace_poses: bool = False,
+    storage: str = '',
+    force: bool = False,
+    progress: Progress | None = None,
+) -> Summary:
     """Copy a recording and add the poses of the feet.
 
     Args:
@@ -113,18 +125,30 @@ def add_foot_poses(
     """
     began = time.monotonic()
     configuration = Configuration.checked(
-        Catalog.load(kinematics_file), chains=chains, version=version, foot_frame=foot_frame,
-        frame_prefix=frame_prefix, joint_timeout=joint_timeout, publish_tf=tf, publish_twist=twist)
+        Catalog.load(kinematics_file),
+        chains=chains,
+        version=version,
+        foot_frame=foot_frame,
+        frame_prefix=frame_prefix,
+        joint_timeout=joint_timeout,
+        publish_tf=tf,
+        publish_twist=twist,
+    )
     _refuse_overlap(source, target)
     storage = _chosen_storage(Path(source), Path(target), storage)
     check_target(target, force=force, may_replace=is_bag)
     with open_bag(source) as bag:
         joint_states = bag.joint_connections(joint_topic)
         types = _Types()
-        old = _OldPoses(bag, [] if only_poses else bag.connections, configuration, types)
+        old = _OldPoses(
+            bag, [] if only_poses else bag.connections, configuration, types
+        )
         if old.found and not replace_poses:
-            raise InputFileError(str(source), f'has {", ".join(old.found)} already; '
-                                 '--replace-poses leaves these out, --only-poses writes the new')
+            raise InputFileError(
+                str(source),
+                f'has {", ".join(old.found)} already; '
+                '--replace-poses leaves these out, --only-poses writes the new',
+            )
         with new_bag(target, storage, force=force) as writer:
             copy = _Copy(writer, bag, old, types)
             poses = _Poses(writer, configuration, copy, types)
@@ -133,14 +157,27 @@ def add_foot_poses(
             _refuse_strangers(source, look, configuration.chains)
     notes = notes_of(look, joint_states[0].topic)
     return Summary(
-        source=str(source), target=str(target), copied=copy.count, added=dict(poses.added),
-        joint_states=look.messages, rejected=dict(look.rejected),
+        source=str(source),
+        target=str(target),
+        copied=copy.count,
+        added=dict(poses.added),
+        joint_states=look.messages,
+        rejected=dict(look.rejected),
         held_back={name: dict(chain.held_back) for name, chain in look.chains.items()},
-        warnings=[*configuration.warnings,
-                  *(str(note) for note in notes if note.level == 'warning')],
-        notes=[*bag.notes, *configuration.notes, *old.notes, *types.notes,
-               *(str(note) for note in notes if note.level != 'warning')],
-        recorded=bag.seconds, took=time.monotonic() - began)
+        warnings=[
+            *configuration.warnings,
+            *(str(note) for note in notes if note.level == 'warning'),
+        ],
+        notes=[
+            *bag.notes,
+            *configuration.notes,
+            *old.notes,
+            *types.notes,
+            *(str(note) for note in notes if note.level != 'warning'),
+        ],
+        recorded=bag.seconds,
+        took=time.monotonic() - began,
+    )
 
 
 class _Types:
@@ -159,7 +196,7 @@ class _Types:
     def hash_of(self, connection: Connection) -> str:
         """Return a type's hash: as recorded, or else from the definition."""
         if connection.digest:
-            return connection.digest
+            return str(connection.digest)
         try:
             return str(self._store_of(connection).hash_rihs01(connection.msgtype))
         except Exception:  # noqa: BLE001 (whatever a strange definition makes of it)
@@ -175,7 +212,9 @@ class _Types:
     def without_frames(self, data: bytes, frames: Collection[str]) -> bytes | None:
         """Return a TFMessage without some child frames; None if nothing is left of it."""
         message = self.store.deserialize_cdr(data, TF)
-        kept = [each for each in message.transforms if each.child_frame_id not in frames]
+        kept = [
+            each for each in message.transforms if each.child_frame_id not in frames
+        ]
         if len(kept) == len(message.transforms):
             return data
         if not kept:
@@ -207,8 +246,13 @@ class _OldPoses:
         notes: the same, as what is left out.
     """
 
-    def __init__(self, bag: Bag, connections: Iterable[Connection], configuration: Configuration,
-                 types: _Types) -> None:
+    def __init__(
+        self,
+        bag: Bag,
+        connections: Iterable[Connection],
+        configuration: Configuration,
+        types: _Types,
+    ) -> None:
         topics = _added_topics(configuration).keys() - {TF_TOPIC}
         poses = [each for each in connections if each.topic in topics]
         self.kept = [each for each in connections if each.topic not in topics]
@@ -225,7 +269,9 @@ class _OldPoses:
         sought = {frame.encode() + b'\0': frame for frame in self.frames}
         found: set[str] = set()
         for _, _, data in bag.messages([connection]):
-            if any(name in data for name in sought):  # which is fast, but `a/x` has `x`, too
+            if any(
+                name in data for name in sought
+            ):  # which is fast, but `a/x` has `x`, too
                 found.update(self.frames.intersection(types.frames(data)))
         if found:
             self.transforms.add(connection.id)
@@ -244,10 +290,17 @@ class _Copy:
         for name, value in bag.custom_data.items():
             writer.set_custom_data(name, str(value))
         self.count = 0
-        self.connections = {each.id: writer.add_connection(
-            each.topic, each.msgtype, msgdef=each.msgdef.data, rihs01=types.hash_of(each),
-            serialization_format='cdr', offered_qos_profiles=each.ext.offered_qos_profiles)
-            for each in old.kept}
+        self.connections = {
+            each.id: writer.add_connection(
+                each.topic,
+                each.msgtype,
+                msgdef=each.msgdef.data,
+                rihs01=types.hash_of(each),
+                serialization_format='cdr',
+                offered_qos_profiles=each.ext.offered_qos_profiles,
+            )
+            for each in old.kept
+        }
         self._write = writer.write
         self._old = old
         self._types = types
@@ -270,12 +323,16 @@ class _Poses:
         added: messages written, by topic.
     """
 
-    def __init__(self, writer: Any, configuration: Configuration, copy: _Copy, types: _Types
-                 ) -> None:
+    def __init__(
+        self, writer: Any, configuration: Configuration, copy: _Copy, types: _Types
+    ) -> None:
         self._time = 0  # when the present message was recorded [ns]
         self.joint_input = JointInput(lambda: self._time)
-        self.joint_input.configure(configuration.chains, configuration.joint_timeout,
-                                   velocities=configuration.publish_twist)
+        self.joint_input.configure(
+            configuration.chains,
+            configuration.joint_timeout,
+            velocities=configuration.publish_twist,
+        )
         topics = _added_topics(configuration)
         self.added = dict.fromkeys(topics, 0)
         there = {(each.topic, each.msgtype): each for each in copy.connections.values()}
@@ -285,13 +342,24 @@ class _Poses:
             if connection is None:
                 depth = _TF_DEPTH if topic == TF_TOPIC else _POSE_DEPTH
                 connection = writer.add_connection(
-                    topic, kind, typestore=types.store, offered_qos_profiles=[reliable_qos(depth)])
+                    topic,
+                    kind,
+                    typestore=types.store,
+                    offered_qos_profiles=[reliable_qos(depth)],
+                )
             send[topic] = self._sender(writer, connection)
-        senders = {chain.name: Senders(send[_topic(chain, 'pose')],
-                                       send.get(_topic(chain, 'twist')))
-                   for chain in configuration.chains}
-        self._stream = PoseStream(configuration.chains, configuration.frame_prefix, senders,
-                                  send.get(TF_TOPIC))
+        senders = {
+            chain.name: Senders(
+                send[_topic(chain, 'pose')], send.get(_topic(chain, 'twist'))
+            )
+            for chain in configuration.chains
+        }
+        self._stream = PoseStream(
+            configuration.chains,
+            configuration.frame_prefix,
+            senders,
+            send.get(TF_TOPIC),
+        )
 
     def take(self, timestamp: int, data: bytes) -> None:
         """Take a message of joint states in, and write what it gives."""
@@ -310,8 +378,13 @@ class _Poses:
         return send
 
 
-def _run(bag: Bag, joint_states: Iterable[Connection], copy: _Copy, poses: _Poses,
-         progress: Progress | None) -> None:
+def _run(
+    bag: Bag,
+    joint_states: Iterable[Connection],
+    copy: _Copy,
+    poses: _Poses,
+    progress: Progress | None,
+) -> None:
     """Copy the messages, each of joint states followed by what it gives."""
     joint_ids = {each.id for each in joint_states}
     copied_ids = copy.connections.keys()
@@ -343,7 +416,9 @@ def _added_frames(configuration: Configuration) -> set[str]:
     """Return the child frames of the transforms that are added."""
     if not configuration.publish_tf:
         return set()
-    return {configuration.frame_prefix + chain.frame_id for chain in configuration.chains}
+    return {
+        configuration.frame_prefix + chain.frame_id for chain in configuration.chains
+    }
 
 
 def _refuse_strangers(source: str | Path, look: Look, chains: Iterable[Chain]) -> None:
@@ -351,26 +426,36 @@ def _refuse_strangers(source: str | Path, look: Look, chains: Iterable[Chain]) -
     if look.joints or look.rejected.keys() - {'time_jump'}:
         return
     fault = 'has a joint of any chain' if look.messages else 'of joint states'
-    wanted = '; '.join(f'{chain.name} needs {", ".join(chain.joint_names)}' for chain in chains)
-    raise InputFileError(str(source), f'no message {fault}; {wanted}; names found: '
-                                      f'{names_that_came(look)}')
+    wanted = '; '.join(
+        f'{chain.name} needs {", ".join(chain.joint_names)}' for chain in chains
+    )
+    raise InputFileError(
+        str(source),
+        f'no message {fault}; {wanted}; names found: {names_that_came(look)}',
+    )
 
 
 def _refuse_overlap(source: str | Path, target: str | Path) -> None:
     """Refuse a target in, over or around the source."""
     here, there = (Path(os.path.realpath(path)) for path in (source, target))
     if here == there or here in there.parents or there in here.parents:
-        raise OutputFileError(str(target), 'is the input itself, or a part of it or what it is '
-                                           'in; allowed: another place')
+        raise OutputFileError(
+            str(target),
+            'is the input itself, or a part of it or what it is '
+            'in; allowed: another place',
+        )
 
 
 def _chosen_storage(source: Path, target: Path, storage: str) -> str:
     """Return the storage to use: as the target's name says, or as asked for, or as it was."""
     named = STORAGES.get(target.suffix, '')
     if named and storage not in ('', named):
-        raise OutputFileError(str(target), f'is a name for {named}, and --storage is {storage}; '
-                                           'allowed: one that agrees, or a name without such an '
-                                           'ending')
+        raise OutputFileError(
+            str(target),
+            f'is a name for {named}, and --storage is {storage}; '
+            'allowed: one that agrees, or a name without such an '
+            'ending',
+        )
     if named or storage:
         return named or storage
     files = source.iterdir() if source.is_dir() else (source,)

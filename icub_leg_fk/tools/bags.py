@@ -29,10 +29,15 @@ STORAGES = {'.mcap': 'mcap', '.db3': 'sqlite3'}
 
 Connection = Any  # of rosbags: a topic of a recording, its type and QoS
 
-_MEND = {'.mcap': '`mcap recover` may mend it', '.db3': '`ros2 bag reindex` may mend it'}
+_MEND = {
+    '.mcap': '`mcap recover` may mend it',
+    '.db3': '`ros2 bag reindex` may mend it',
+}
 _CLEAN = re.compile(r'/?(?!/)[A-Za-z0-9._/ +@:,=-]*')  # what also sqlite takes as it is
 _TAIL = 1 << 20  # bytes of an MCAP file, with its summary
-_MCAP_TOPIC = re.compile(rb'([!-~]+)[\4\x08\x0a]\0\0\0(json|ros1|cbor|protobuf|flatbuffer)')
+_MCAP_TOPIC = re.compile(
+    rb'([!-~]+)[\4\x08\x0a]\0\0\0(json|ros1|cbor|protobuf|flatbuffer)'
+)
 _PROGRESS = 1000  # messages between two looks
 
 
@@ -44,8 +49,11 @@ def import_rosbags() -> ModuleType:
         import rosbags.typesys
     except ImportError as error:
         raise MissingDependencyError(
-            'rosbags', 'a bag', 'pip install "rosbags>=0.11.9,<0.12" (on Ubuntu in a virtual '
-            'environment made with --system-site-packages)') from error
+            'rosbags',
+            'a bag',
+            'pip install "rosbags>=0.11.9,<0.12" (on Ubuntu in a virtual '
+            'environment made with --system-site-packages)',
+        ) from error
     return rosbags
 
 
@@ -93,8 +101,9 @@ class Bag:
         self._stored = stored = _stored_connections(reader)
         listed = list(reader.connections)
         _refuse_odd_metadata(path, reader)
-        _refuse_other_than_cdr(path, {each.topic: each.ext.serialization_format
-                                      for each in stored})
+        _refuse_other_than_cdr(
+            path, {each.topic: each.ext.serialization_format for each in stored}
+        )
         pairs = _paired(stored, listed)
         held = Counter[int]()
         for each in stored:
@@ -102,7 +111,9 @@ class Bag:
         paired_ids = {each.id for each in pairs.values()}
         there = [each for each in listed if each.id in paired_ids or not each.msgcount]
         described = {each.id: each for each in (*there, *pairs.values())}
-        counted = {id_: each._replace(msgcount=held[id_]) for id_, each in described.items()}
+        counted = {
+            id_: each._replace(msgcount=held[id_]) for id_, each in described.items()
+        }
         self._connection_of = {id_: counted[each.id] for id_, each in pairs.items()}
         self.connections = list(counted.values())
         self.custom_data = dict(reader.storage.metadata.custom or {})
@@ -122,18 +133,23 @@ class Bag:
             there = f'it has no topic of type {JOINT_STATE}'
             if known:
                 there = f'--joint-topic can be {", ".join(known)}'
-            raise InputFileError(str(self.path), f'no joint states on {chosen}; {there}')
+            raise InputFileError(
+                str(self.path), f'no joint states on {chosen}; {there}'
+            )
         return [each for each in connections if each.topic == chosen]
 
-    def messages(self, connections: Iterable[Connection], progress: Progress | None = None
-                 ) -> Iterator[tuple[Connection, int, bytes]]:
+    def messages(
+        self, connections: Iterable[Connection], progress: Progress | None = None
+    ) -> Iterator[tuple[Connection, int, bytes]]:
         """Yield connection, time of recording [ns] and CDR bytes of each message.
 
         Raises:
             InputFileError: the recording is damaged, or holds fewer messages than it counts.
         """
         wanted = {each.id: each.msgcount for each in connections}
-        stored = [each for each in self._stored if self._connection_of[each.id].id in wanted]
+        stored = [
+            each for each in self._stored if self._connection_of[each.id].id in wanted
+        ]
         if not stored:  # which rosbags would take for all
             return
         expected = sum(wanted.values())
@@ -147,8 +163,12 @@ class Bag:
         except Exception as error:
             raise _unreadable(self.path, error) from error
         if read != expected:
-            raise _unreadable(self.path, ValueError(
-                f'it counts {expected} messages on these topics, and {read} were read'))
+            raise _unreadable(
+                self.path,
+                ValueError(
+                    f'it counts {expected} messages on these topics, and {read} were read'
+                ),
+            )
 
 
 @contextmanager
@@ -168,13 +188,16 @@ def new_bag(path: str | Path, storage: str, *, force: bool) -> Iterator[Any]:
         is_file = place.suffix in STORAGES
         directory = place.with_name(f'{place.stem}.directory') if is_file else place
         try:
-            with rosbag2.Writer(directory, version=rosbag2.Writer.VERSION_LATEST,
-                                storage_plugin=rosbag2.StoragePlugin[storage.upper()]) as writer:
+            with rosbag2.Writer(
+                directory,
+                version=rosbag2.Writer.VERSION_LATEST,
+                storage_plugin=rosbag2.StoragePlugin[storage.upper()],
+            ) as writer:
                 yield writer
         except (sqlite3.Error, rosbag2.WriterError) as error:
             raise OutputFileError(str(path), f'cannot be written: {error}') from error
         if is_file:
-            file, = directory.glob(f'*{place.suffix}')
+            (file,) = directory.glob(f'*{place.suffix}')
             file.rename(place)
 
 
@@ -183,9 +206,16 @@ def reliable_qos(depth: int) -> Any:
     interfaces = import_rosbags().interfaces
     forever = interfaces.QosTime(2147483647, 4294967295)
     return interfaces.Qos(
-        interfaces.QosHistory.KEEP_LAST, depth, interfaces.QosReliability.RELIABLE,
-        interfaces.QosDurability.VOLATILE, forever, forever, interfaces.QosLiveliness.AUTOMATIC,
-        forever, False)
+        interfaces.QosHistory.KEEP_LAST,
+        depth,
+        interfaces.QosReliability.RELIABLE,
+        interfaces.QosDurability.VOLATILE,
+        forever,
+        forever,
+        interfaces.QosLiveliness.AUTOMATIC,
+        forever,
+        False,
+    )
 
 
 def _stored_connections(reader: Any) -> list[Connection]:
@@ -193,21 +223,29 @@ def _stored_connections(reader: Any) -> list[Connection]:
     if not hasattr(reader.storage, 'storages'):  # a single file
         return list(reader.connections)
     found: list[Connection] = []
-    places: dict[tuple[str, str], list[int]] = {}  # in what was found, by topic and type
+    places: dict[
+        tuple[str, str], list[int]
+    ] = {}  # in what was found, by topic and type
     for storage in reader.storage.storages:
         for each in storage.connections:
             alike = places.setdefault((each.topic, each.msgtype), [])
-            place = next((place for place in alike if found[place].ext == each.ext), None)
+            place = next(
+                (place for place in alike if found[place].ext == each.ext), None
+            )
             if place is None:
                 alike.append(len(found))
-                found.append(each._replace(id=-1 - len(found)))  # no id that metadata.yaml has
+                found.append(
+                    each._replace(id=-1 - len(found))
+                )  # no id that metadata.yaml has
             else:
                 total = found[place].msgcount + each.msgcount
                 found[place] = found[place]._replace(msgcount=total)
     return found
 
 
-def _paired(stored: Iterable[Connection], listed: Iterable[Connection]) -> dict[int, Connection]:
+def _paired(
+    stored: Iterable[Connection], listed: Iterable[Connection]
+) -> dict[int, Connection]:
     """Return by the ids of the files' topics what metadata.yaml lists them as, or themselves."""
     by_topic: dict[tuple[str, str], list[Connection]] = {}
     for each in listed:
@@ -220,8 +258,9 @@ def _paired(stored: Iterable[Connection], listed: Iterable[Connection]) -> dict[
     return pairs
 
 
-def _notes_on_counts(total: int, listed: Iterable[Connection], held: Iterable[Connection]
-                     ) -> list[str]:
+def _notes_on_counts(
+    total: int, listed: Iterable[Connection], held: Iterable[Connection]
+) -> list[str]:
     """Return a note if metadata.yaml counts other messages than the files hold."""
     in_metadata = Counter({'in all': total})
     in_files = Counter({'in all': sum(each.msgcount for each in held)})
@@ -229,12 +268,17 @@ def _notes_on_counts(total: int, listed: Iterable[Connection], held: Iterable[Co
         in_metadata[each.topic] += each.msgcount
     for each in held:
         in_files[each.topic] += each.msgcount
-    faults = [f'{topic} {in_metadata[topic]} and {in_files[topic]}'
-              for topic in in_metadata | in_files if in_metadata[topic] != in_files[topic]]
+    faults = [
+        f'{topic} {in_metadata[topic]} and {in_files[topic]}'
+        for topic in in_metadata | in_files
+        if in_metadata[topic] != in_files[topic]
+    ]
     if not faults:
         return []
-    return [f'{METADATA} counts other messages than its files hold ({", ".join(faults)}); all of '
-            'the files were read']
+    return [
+        f'{METADATA} counts other messages than its files hold ({", ".join(faults)}); all of '
+        'the files were read'
+    ]
 
 
 def _unreadable(path: Path, error: Exception) -> InputFileError:
@@ -245,7 +289,9 @@ def _unreadable(path: Path, error: Exception) -> InputFileError:
     elif path.is_dir():
         reason, mend = _reason_and_mend(path, reason)
     else:
-        mend = _MEND.get(path.suffix, 'allowed: a rosbag2 directory, or a .mcap or .db3 file')
+        mend = _MEND.get(
+            path.suffix, 'allowed: a rosbag2 directory, or a .mcap or .db3 file'
+        )
     return InputFileError(str(path), f'cannot be read: {reason}; {mend}')
 
 
@@ -275,11 +321,14 @@ def _refuse_other_recordings(path: Path) -> None:
     if path.is_dir():
         files = sorted(entry for entry in path.iterdir() if entry.suffix in STORAGES)
     elif path.suffix == '.zstd':
-        raise InputFileError(str(path), 'is a compressed file alone; give its directory, or '
-                                        'decompress it: zstd -d')
+        raise InputFileError(
+            str(path),
+            'is a compressed file alone; give its directory, or decompress it: zstd -d',
+        )
     elif _first_bytes(path, 7) == b'#ROSBAG':
-        raise InputFileError(str(path), 'is a ROS 1 bag; `rosbags-convert` makes a ROS 2 '
-                                        'recording of it')
+        raise InputFileError(
+            str(path), 'is a ROS 1 bag; `rosbags-convert` makes a ROS 2 recording of it'
+        )
     encodings = _encodings_in_metadata(path / METADATA)
     for file in files:
         if file.suffix == '.db3':
@@ -287,7 +336,9 @@ def _refuse_other_recordings(path: Path) -> None:
         if file.suffix == '.mcap':
             encodings |= _encodings_of_other_mcap(file)
     if 'ros1' in encodings.values():
-        raise InputFileError(str(path), 'is an MCAP file of ROS 1 messages; allowed: of ROS 2')
+        raise InputFileError(
+            str(path), 'is an MCAP file of ROS 1 messages; allowed: of ROS 2'
+        )
     _refuse_other_than_cdr(path, encodings)
 
 
@@ -295,17 +346,28 @@ def _refuse_waiting_messages(path: Path, file: Path) -> None:
     """Refuse a database some of whose messages are in the log beside it still."""
     log = file.with_name(f'{file.name}-wal')
     if log.is_file() and log.stat().st_size:
-        raise InputFileError(str(path), (
-            f'{log.name} holds messages that are not in {file.name} yet; this brings them in: '
-            f"sqlite3 {file.name} 'PRAGMA wal_checkpoint(TRUNCATE)'"))
+        raise InputFileError(
+            str(path),
+            (
+                f'{log.name} holds messages that are not in {file.name} yet; this brings them in: '
+                f"sqlite3 {file.name} 'PRAGMA wal_checkpoint(TRUNCATE)'"
+            ),
+        )
 
 
 def _refuse_other_than_cdr(path: Path, encodings: Mapping[str, str]) -> None:
     """Refuse a recording that has other encodings, which are given by topic, than ROS 2's."""
-    odd = [f'{topic} ({encoding})' for topic, encoding in encodings.items() if encoding != 'cdr']
+    odd = [
+        f'{topic} ({encoding})'
+        for topic, encoding in encodings.items()
+        if encoding != 'cdr'
+    ]
     if odd:
-        raise InputFileError(str(path), f'the messages of {", ".join(sorted(odd))} are not CDR; '
-                                        'allowed: recordings of ROS 2, which are')
+        raise InputFileError(
+            str(path),
+            f'the messages of {", ".join(sorted(odd))} are not CDR; '
+            'allowed: recordings of ROS 2, which are',
+        )
 
 
 def _refuse_odd_metadata(path: Path, reader: Any) -> None:
@@ -320,7 +382,9 @@ def _encodings_in_metadata(file: Path) -> dict[str, str]:
     """Return the encodings by topic that metadata.yaml names, if it can be read."""
     encodings = {}
     with suppress(Exception):
-        bag = yaml.safe_load(file.read_text(encoding='utf-8'))['rosbag2_bagfile_information']
+        bag = yaml.safe_load(file.read_text(encoding='utf-8'))[
+            'rosbag2_bagfile_information'
+        ]
         for topic in bag['topics_with_message_count']:
             about = topic['topic_metadata']
             encodings[about['name']] = about['serialization_format']
@@ -333,14 +397,18 @@ def _encodings_of_other_mcap(file: Path) -> dict[str, str]:
     rosbags tells no more of such a file than that its profile is another.
     """
     head = _first_bytes(file, 4096)
-    profile = head[21:21 + int.from_bytes(head[17:21], 'little')]
+    profile_end = 21 + int.from_bytes(head[17:21], 'little')
+    profile = head[21:profile_end]
     if profile == b'ros2' or not head.startswith(b'\x89MCAP0\r\n'):
         return {}
     with file.open('rb') as stream:
         size = stream.seek(0, os.SEEK_END)
         stream.seek(max(0, size - _TAIL))
         tail = stream.read()
-    return {topic.decode(): encoding.decode() for topic, encoding in _MCAP_TOPIC.findall(tail)}
+    return {
+        topic.decode(): encoding.decode()
+        for topic, encoding in _MCAP_TOPIC.findall(tail)
+    }
 
 
 def _first_bytes(file: Path, count: int) -> bytes:

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 from icub_leg_fk.errors import LegFKError, MissingDependencyError, OutputFileError
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
+from icub_leg_fk.stream.colors import color_of
 from icub_leg_fk.tools.output_file import check_target, whole_path
 from icub_leg_fk.tools.recording import ChainTrack, time_span
 import numpy as np
@@ -28,7 +29,11 @@ if TYPE_CHECKING:
     from mpl_toolkits.mplot3d import Axes3D
 
 FORMATS = ('.png', '.svg', '.pdf')
-AXIS_COLORS = ('#d62728', '#2ca02c', '#1f5fd0')  # x red, y green, z blue, as viewers have it
+AXIS_COLORS = (
+    '#d62728',
+    '#2ca02c',
+    '#1f5fd0',
+)  # x red, y green, z blue, as viewers have it
 INK = '#222222'
 FAINT = '#6f6f6f'
 GRID = '#dddddd'
@@ -36,9 +41,6 @@ FLOOR = '#f7f7f7'
 MINUS = '\N{MINUS SIGN}'
 LETTERS = 'ABCD'  # of the instants at which the chains are drawn
 
-_LEFT = '#6a3d9a'
-_RIGHT = '#e08214'  # told apart from the left in every kind of colour vision
-_OTHERS = ('#00798c', '#8c6d31', '#a8437c')
 _WIDTH = 13.333  # inches, of a slide
 _HEIGHT = 7.5
 _ROW = 0.3  # inches, of a bar and its name
@@ -46,15 +48,34 @@ _COLUMNS = 800  # of a panel
 _MOST_SAMPLES = 4 * _COLUMNS  # of a curve; more cannot be seen and become a band
 _GAP = 5.0  # so many usual intervals without a pose are a gap
 _TRAIL = 0.5  # s of a tip's path before and after an instant
-_COORDINATES = {'z': 2, 'x': 0, 'y': 1}  # in the order of their panels, with their columns
+_COORDINATES = {
+    'z': 2,
+    'x': 0,
+    'y': 1,
+}  # in the order of their panels, with their columns
 _SETTINGS: dict[str, Any] = {
-    'font.family': 'sans-serif', 'font.sans-serif': ['DejaVu Sans'], 'font.size': 12,
-    'axes.titlesize': 12, 'axes.titleweight': 'bold',
-    'axes.edgecolor': FAINT, 'axes.spines.top': False, 'axes.spines.right': False,
-    'axes.grid': True, 'axes.axisbelow': True, 'grid.color': GRID, 'xtick.color': FAINT,
-    'ytick.color': FAINT, 'xtick.labelcolor': INK, 'ytick.labelcolor': INK, 'text.color': INK,
-    'axes.labelcolor': INK, 'legend.frameon': False, 'svg.fonttype': 'none',
-    'svg.hashsalt': 'leg_fk', 'pdf.fonttype': 42}
+    'font.family': 'sans-serif',
+    'font.sans-serif': ['DejaVu Sans'],
+    'font.size': 12,
+    'axes.titlesize': 12,
+    'axes.titleweight': 'bold',
+    'axes.edgecolor': FAINT,
+    'axes.spines.top': False,
+    'axes.spines.right': False,
+    'axes.grid': True,
+    'axes.axisbelow': True,
+    'grid.color': GRID,
+    'xtick.color': FAINT,
+    'ytick.color': FAINT,
+    'xtick.labelcolor': INK,
+    'ytick.labelcolor': INK,
+    'text.color': INK,
+    'axes.labelcolor': INK,
+    'legend.frameon': False,
+    'svg.fonttype': 'none',
+    'svg.hashsalt': 'leg_fk',
+    'pdf.fonttype': 42,
+}
 
 
 class OutOfRange(NamedTuple):
@@ -74,16 +95,25 @@ class OutOfRange(NamedTuple):
 def import_matplotlib() -> tuple[ModuleType, ModuleType]:
     """Return the package matplotlib, which draws figures, and its module of things in space."""
     os.environ |= {'MPLBACKEND': 'agg', 'MATPLOTLIBRC': os.devnull}
-    logging.getLogger('matplotlib').setLevel(logging.CRITICAL)  # what it says of a matplotlibrc
+    logging.getLogger('matplotlib').setLevel(
+        logging.CRITICAL
+    )  # what it says of a matplotlibrc
     try:
         import matplotlib.figure
         from mpl_toolkits.mplot3d import art3d
     except ImportError as error:
-        raise MissingDependencyError('matplotlib', 'a picture', 'pip install matplotlib (rosdep '
-                                     'key python3-matplotlib)') from error
-    except ValueError as error:  # a matplotlibrc in the working directory that is not text
-        raise LegFKError(f'matplotlib cannot be imported: {error}; is there a file matplotlibrc '
-                         'in this directory?') from error
+        raise MissingDependencyError(
+            'matplotlib',
+            'a picture',
+            'pip install matplotlib (rosdep key python3-matplotlib)',
+        ) from error
+    except (
+        ValueError
+    ) as error:  # a matplotlibrc in the working directory that is not text
+        raise LegFKError(
+            f'matplotlib cannot be imported: {error}; is there a file matplotlibrc '
+            'in this directory?'
+        ) from error
     return matplotlib, art3d
 
 
@@ -103,12 +133,14 @@ def check_output(path: str | Path, force: bool) -> None:
     check_target(path, force=force)
     ending = Path(path).suffix
     if ending.lower() not in FORMATS:
-        raise OutputFileError(str(path), f'found {ending or "no ending"}, allowed: '
-                                         f'{", ".join(FORMATS)}')
+        raise OutputFileError(
+            str(path), f'found {ending or "no ending"}, allowed: {", ".join(FORMATS)}'
+        )
 
 
-def save_picture(draw: Callable[[], Figure], path: str | Path, *, force: bool, dpi: int = 150
-                 ) -> None:
+def save_picture(
+    draw: Callable[[], Figure], path: str | Path, *, force: bool, dpi: int = 150
+) -> None:
     """Draw a picture and write it in the format that its ending names, whole or not at all."""
     kind = Path(path).suffix.lower().lstrip('.')
     no_date = {'svg': {'Date': None}, 'pdf': {'CreationDate': None}}
@@ -126,7 +158,9 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def feet_figure(tracks: Sequence[ChainTrack], instants: Sequence[float], title: str) -> Figure:
+def feet_figure(
+    tracks: Sequence[ChainTrack], instants: Sequence[float], title: str
+) -> Figure:
     """Return the tips over time, and beside them the chains in space.
 
     Args:
@@ -144,9 +178,16 @@ def feet_figure(tracks: Sequence[ChainTrack], instants: Sequence[float], title: 
     named = ', '.join(dict.fromkeys(frames))
     figure.text(0.03, 1 - 0.35 / height, title, fontsize=19, weight='bold', va='center')
     small: dict[str, Any] = {'fontsize': 10.5, 'va': 'center', 'color': FAINT}
-    figure.text(0.03, 1 - 0.8 / height, _notes(tracks, bool(outside)), ha='left', **small)
-    figure.text(0.985, 1 - 0.8 / height, f'axes of {named};  squares of {space.step:g} m',
-                ha='right', **small)
+    figure.text(
+        0.03, 1 - 0.8 / height, _notes(tracks, bool(outside)), ha='left', **small
+    )
+    figure.text(
+        0.985,
+        1 - 0.8 / height,
+        f'axes of {named};  squares of {space.step:g} m',
+        ha='right',
+        **small,
+    )
     return figure
 
 
@@ -154,11 +195,18 @@ def outside_ranges(track: ChainTrack) -> list[OutOfRange]:
     """Return when joints were beyond an end of their range."""
     chain = track.chain
     found = []
-    for name, link, q in zip(chain.joint_names, chain.joints, track.positions.T, strict=True):
+    for name, link, q in zip(
+        chain.joint_names, chain.joints, track.positions.T, strict=True
+    ):
         lower, upper = link.limits
-        for is_outside, sign, limit in ((q < lower, '<', lower), (q > upper, '>', upper)):
+        for is_outside, sign, limit in (
+            (q < lower, '<', lower),
+            (q > upper, '>', upper),
+        ):
             if is_outside.any():
-                value = f'{limit:g} m' if link.is_prismatic else f'{math.degrees(limit):g}°'
+                value = (
+                    f'{limit:g} m' if link.is_prismatic else f'{math.degrees(limit):g}°'
+                )
                 text = f'{name} {sign} {value}'.replace('-', MINUS)
                 found.append(OutOfRange(chain, text, _spans(track.times, is_outside)))
     return found
@@ -169,18 +217,11 @@ def gaps(tracks: Sequence[ChainTrack]) -> list[tuple[float, float]]:
     found = set()
     for track in tracks:
         for after in _breaks(track.times):
-            begin, end = track.times[after - 1:after + 1].tolist()
+            before = after - 1
+            begin, end = track.times[[before, after]].tolist()
             if end > begin:
                 found.add((begin, end))
     return sorted(found)
-
-
-def color_of(chain: Chain) -> str:
-    """Return a chain's colour: one for everything left, one for everything right."""
-    for word, color in (('left', _LEFT), ('right', _RIGHT)):
-        if word in chain.tip or word in chain.name:
-            return color
-    return _OTHERS[sum(map(ord, chain.name)) % len(_OTHERS)]
 
 
 class Space:
@@ -201,16 +242,25 @@ class Space:
         step: side of a square of the floor [m].
     """
 
-    def __init__(self, figure: Figure, place: Any, points: Array, azimuth: float = 210.0,
-                 elevation: float = 18.0, zoom: float = 1.15) -> None:
+    def __init__(
+        self,
+        figure: Figure,
+        place: Any,
+        points: Array,
+        azimuth: float = 210.0,
+        elevation: float = 18.0,
+        zoom: float = 1.15,
+    ) -> None:
         self.axes: Axes3D = figure.add_subplot(
-            place, projection='3d', proj_type='ortho', computed_zorder=False)
+            place, projection='3d', proj_type='ortho', computed_zorder=False
+        )
         self.axes.view_init(elevation, azimuth)
         self.axes.set_axis_off()
         az = math.radians(azimuth)
         el = math.radians(elevation)
-        self._toward_viewer = np.array([
-            math.cos(el) * math.cos(az), math.cos(el) * math.sin(az), math.sin(el)])
+        self._toward_viewer = np.array(
+            [math.cos(el) * math.cos(az), math.cos(el) * math.sin(az), math.sin(el)]
+        )
         self._rightward = np.array([-math.sin(az), math.cos(az), 0.0])
         points = np.vstack((points, np.zeros((1, 3))))
         self.step = step = _round_step(float(np.ptp(points, axis=0).max()) / 7)
@@ -230,37 +280,83 @@ class Space:
         """Draw a line through (N, 3) points of the root frame."""
         self.axes.plot(*np.transpose(points), clip_on=False, **style)
 
-    def fill(self, corners: ArrayLike, color: str, zorder: float, alpha: float = 1.0) -> None:
+    def fill(
+        self, corners: ArrayLike, color: str, zorder: float, alpha: float = 1.0
+    ) -> None:
         """Fill a polygon of (N, 3) corners."""
         _, art3d = import_matplotlib()
-        self.axes.add_collection3d(art3d.Poly3DCollection(
-            [np.asarray(corners)], facecolor=color, alpha=alpha, zorder=zorder, clip_on=False))
+        self.axes.add_collection3d(
+            art3d.Poly3DCollection(
+                [np.asarray(corners)],
+                facecolor=color,
+                alpha=alpha,
+                zorder=zorder,
+                clip_on=False,
+            )
+        )
 
-    def frame(self, T: Array, length: float, zorder: float, width: float = 2.0,
-              labels: Sequence[str] = 'xyz', size: float = 9.0) -> None:
+    def frame(
+        self,
+        T: Array,
+        length: float,
+        zorder: float,
+        width: float = 2.0,
+        labels: Sequence[str] = 'xyz',
+        size: float = 9.0,
+    ) -> None:
         """Draw the axes of a (4, 4) frame with their names, the nearest last."""
         origin = T[:3, 3]
         for i in sorted(range(3), key=lambda i: self.depth(T[:3, i])):
             axis = T[:3, i]
             color = AXIS_COLORS[i]
-            self.axes.quiver(*origin, *(length * axis), color=color, clip_on=False,
-                             linewidth=width, arrow_length_ratio=0.3, zorder=zorder)
-            self.axes.text(*(origin + 1.2 * length * axis), labels[i], fontsize=size, color=color,
-                           weight='bold', va='center', ha=self._side(axis), zorder=zorder + 1)
+            self.axes.quiver(
+                *origin,
+                *(length * axis),
+                color=color,
+                clip_on=False,
+                linewidth=width,
+                arrow_length_ratio=0.3,
+                zorder=zorder,
+            )
+            self.axes.text(
+                *(origin + 1.2 * length * axis),
+                labels[i],
+                fontsize=size,
+                color=color,
+                weight='bold',
+                va='center',
+                ha=self._side(axis),
+                zorder=zorder + 1,
+            )
 
     def chain(self, chain: Chain, q: ArrayLike, zorder: float) -> None:
         """Draw a chain's skeleton from the root to its tip, its joints, and its sole if any."""
         points = chain.frames(q)[:, :3, 3]
         color = color_of(chain)
-        self.line([(0.0, 0.0, 0.0), points[0]], color=FAINT, linewidth=2.5, zorder=zorder,
-                  linestyle=(0, (2, 1.2)))
+        self.line(
+            [(0.0, 0.0, 0.0), points[0]],
+            color=FAINT,
+            linewidth=2.5,
+            zorder=zorder,
+            linestyle=(0, (2, 1.2)),
+        )
         corners = chain.sole_outline(q)
         if corners is not None:
             self.fill(corners, color, zorder, 0.3)
         self.line(points, color='white', linewidth=8, zorder=zorder + 1)
-        self.line(points, color=color, linewidth=4, zorder=zorder + 2, solid_joinstyle='round')
-        self.line(points[:-1], color=color, linestyle='', marker='o', markersize=6.5,
-                  markerfacecolor='white', markeredgewidth=1.8, zorder=zorder + 3)
+        self.line(
+            points, color=color, linewidth=4, zorder=zorder + 2, solid_joinstyle='round'
+        )
+        self.line(
+            points[:-1],
+            color=color,
+            linestyle='',
+            marker='o',
+            markersize=6.5,
+            markerfacecolor='white',
+            markeredgewidth=1.8,
+            zorder=zorder + 3,
+        )
 
     def _side(self, axis: Array) -> str:
         """Return how text at the end of an axis is aligned to stay clear of it."""
@@ -276,7 +372,9 @@ class Space:
         xs = np.arange(x0, highest[0] + self.step / 2, self.step)
         ys = np.arange(y0, highest[1] + self.step / 2, self.step)
         x1, y1 = xs[-1], ys[-1]
-        self.fill([(x0, y0, low), (x1, y0, low), (x1, y1, low), (x0, y1, low)], FLOOR, 0)
+        self.fill(
+            [(x0, y0, low), (x1, y0, low), (x1, y1, low), (x0, y1, low)], FLOOR, 0
+        )
         style: dict[str, Any] = {'color': GRID, 'linewidth': 1, 'zorder': 1}
         for x in xs:
             self.line([(x, y0, low), (x, y1, low)], **style)
@@ -284,21 +382,34 @@ class Space:
             self.line([(x0, y, low), (x1, y, low)], **style)
 
 
-def _draw_time(figure: Figure, tracks: Sequence[ChainTrack], instants: Sequence[float],
-               outside: Sequence[OutOfRange]) -> None:
+def _draw_time(
+    figure: Figure,
+    tracks: Sequence[ChainTrack],
+    instants: Sequence[float],
+    outside: Sequence[OutOfRange],
+) -> None:
     """Draw the tips' coordinates, and when joints were outside their ranges, over time."""
     height = figure.get_figheight()
     ratios = [1.0] * len(_COORDINATES)
     if outside:
         ratios.append(_ROW * (len(outside) + 0.3) / 1.6)
-    panels = figure.subplots(len(ratios), sharex=True, gridspec_kw={
-        'left': 0.075, 'right': 0.5, 'top': 1 - 1.35 / height, 'bottom': 0.65 / height,
-        'hspace': 0.42, 'height_ratios': ratios})
-    _draw_tips(panels[:len(_COORDINATES)], tracks)
+    panels = figure.subplots(
+        len(ratios),
+        sharex=True,
+        gridspec_kw={
+            'left': 0.075,
+            'right': 0.5,
+            'top': 1 - 1.35 / height,
+            'bottom': 0.65 / height,
+            'hspace': 0.42,
+            'height_ratios': ratios,
+        },
+    )
+    _draw_tips(panels[: len(_COORDINATES)], tracks)
     if outside:
         _draw_outside_ranges(panels[-1], outside)
     panels[-1].set_xlabel('time [s]')
-    _mark_instants(panels[:len(_COORDINATES)], instants)
+    _mark_instants(panels[: len(_COORDINATES)], instants)
 
 
 def _draw_tips(panels: Sequence[Axes], tracks: Sequence[ChainTrack]) -> None:
@@ -307,8 +418,14 @@ def _draw_tips(panels: Sequence[Axes], tracks: Sequence[ChainTrack]) -> None:
     for panel, (name, column) in zip(panels, _COORDINATES.items(), strict=True):
         for track in tracks:
             _draw_curve(panel, track, column)
-        panel.broken_barh(bars, (0, 1), color='black', alpha=0.12, linewidth=0,
-                          transform=panel.get_xaxis_transform())
+        panel.broken_barh(
+            bars,
+            (0, 1),
+            color='black',
+            alpha=0.12,
+            linewidth=0,
+            transform=panel.get_xaxis_transform(),
+        )
         panel.set_title(f'{name} in {tracks[0].chain.root_frame} [m]', loc='left')
         panel.margins(x=0, y=0.12)
         panel.locator_params(axis='y', nbins=4)
@@ -316,8 +433,15 @@ def _draw_tips(panels: Sequence[Axes], tracks: Sequence[ChainTrack]) -> None:
     if start == end:
         start, end = start - 0.5, end + 0.5
     panels[0].set_xlim(start, end)
-    panels[0].legend(loc='lower right', bbox_to_anchor=(1.0, 0.97), ncols=len(tracks), fontsize=11,
-                     borderpad=0, handlelength=1.2, columnspacing=1.2)
+    panels[0].legend(
+        loc='lower right',
+        bbox_to_anchor=(1.0, 0.97),
+        ncols=len(tracks),
+        fontsize=11,
+        borderpad=0,
+        handlelength=1.2,
+        columnspacing=1.2,
+    )
 
 
 def _draw_curve(panel: Axes, track: ChainTrack, column: int) -> None:
@@ -328,9 +452,14 @@ def _draw_curve(panel: Axes, track: ChainTrack, column: int) -> None:
         return
     breaks = _breaks(track.times)
     is_hardly_a_line = len(np.unique(track.times)) < 3
-    panel.plot(np.insert(track.times, breaks, np.nan), np.insert(values, breaks, np.nan),
-               color=color_of(track.chain), label=_label(track), linewidth=2,
-               marker='o' if is_hardly_a_line else '')
+    panel.plot(
+        np.insert(track.times, breaks, np.nan),
+        np.insert(values, breaks, np.nan),
+        color=color_of(track.chain),
+        label=_label(track),
+        linewidth=2,
+        marker='o' if is_hardly_a_line else '',
+    )
 
 
 def _draw_band(panel: Axes, track: ChainTrack, values: Array) -> None:
@@ -360,9 +489,16 @@ def _draw_outside_ranges(panel: Axes, rows: Sequence[OutOfRange]) -> None:
     least = (end - start) / 300  # what can be seen
     for row, outside in enumerate(rows):
         bars = [(begin, max(finish - begin, least)) for begin, finish in outside.spans]
-        panel.broken_barh(bars, (row + 0.55, 0.3), color=color_of(outside.chain), linewidth=0)
-        panel.text(0.005, row + 0.5, outside.text, fontsize=10,
-                   transform=panel.get_yaxis_transform())
+        panel.broken_barh(
+            bars, (row + 0.55, 0.3), color=color_of(outside.chain), linewidth=0
+        )
+        panel.text(
+            0.005,
+            row + 0.5,
+            outside.text,
+            fontsize=10,
+            transform=panel.get_yaxis_transform(),
+        )
     panel.set_yticks([])
     panel.set_ylim(len(rows) + 0.1, -0.2)
     panel.set_title('outside its range', loc='left')
@@ -376,20 +512,40 @@ def _mark_instants(panels: Sequence[Axes], instants: Sequence[float]) -> None:
             panel.axvline(instant, color=INK, linewidth=1, linestyle=(0, (1, 2)))
     right_of_last = start
     for letter, instant in zip(LETTERS, instants):
-        at = max(instant, right_of_last)  # so that letters of near instants stand side by side
+        at = max(
+            instant, right_of_last
+        )  # so that letters of near instants stand side by side
         right_of_last = at + 0.03 * (end - start)
-        panels[0].text(at, 0.99, letter, ha='center', va='top', weight='bold', fontsize=11,
-                       transform=panels[0].get_xaxis_transform(),
-                       bbox={'facecolor': 'white', 'linewidth': 0, 'pad': 0.5})
+        panels[0].text(
+            at,
+            0.99,
+            letter,
+            ha='center',
+            va='top',
+            weight='bold',
+            fontsize=11,
+            transform=panels[0].get_xaxis_transform(),
+            bbox={'facecolor': 'white', 'linewidth': 0, 'pad': 0.5},
+        )
 
 
-def _draw_scenes(figure: Figure, tracks: Sequence[ChainTrack], instants: Sequence[float]) -> Space:
+def _draw_scenes(
+    figure: Figure, tracks: Sequence[ChainTrack], instants: Sequence[float]
+) -> Space:
     """Draw the chains in space at each instant; return the last view."""
     height = figure.get_figheight()
     columns = min(2, len(instants))
     rows = math.ceil(len(instants) / 2)
-    places = figure.add_gridspec(rows, columns, left=0.53, right=0.995, top=1 - 0.95 / height,
-                                 bottom=0.01, wspace=0.0, hspace=0.0)
+    places = figure.add_gridspec(
+        rows,
+        columns,
+        left=0.53,
+        right=0.995,
+        top=1 - 0.95 / height,
+        bottom=0.01,
+        wspace=0.0,
+        hspace=0.0,
+    )
     points = []
     for instant in instants:
         for track in tracks:
@@ -399,8 +555,13 @@ def _draw_scenes(figure: Figure, tracks: Sequence[ChainTrack], instants: Sequenc
     for i, (letter, instant) in enumerate(zip(LETTERS, instants)):
         space = Space(figure, places[i], everywhere)
         _draw_scene(space, tracks, instant)
-        space.axes.text2D(0.06, 0.95, f'{letter}  {instant:.2f} s', weight='bold',
-                          transform=space.axes.transAxes)
+        space.axes.text2D(
+            0.06,
+            0.95,
+            f'{letter}  {instant:.2f} s',
+            weight='bold',
+            transform=space.axes.transAxes,
+        )
     return space
 
 
@@ -417,8 +578,13 @@ def _draw_scene(space: Space, tracks: Sequence[ChainTrack], instant: float) -> N
         zorder = 10.0 * (rank + 1)
         q = track.positions[i]
         around = np.abs(track.times - track.times[i]) <= _TRAIL
-        space.line(track.poses[around, :3], color=color_of(track.chain), linewidth=1, alpha=0.5,
-                   zorder=zorder)
+        space.line(
+            track.poses[around, :3],
+            color=color_of(track.chain),
+            linewidth=1,
+            alpha=0.5,
+            zorder=zorder,
+        )
         space.chain(track.chain, q, zorder)
         space.frame(track.chain.forward(q), space.step, zorder + 5, 1.8, size=8)
 

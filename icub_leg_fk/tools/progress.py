@@ -50,5 +50,11 @@ def _bar() -> Any:
     console = rich.console.Console(stderr=True, markup=False, highlight=False)
     name = rich.progress.TextColumn('{task.description}', markup=False)
     share = rich.progress.TextColumn('{task.percentage:3.0f} %', markup=False)
-    return rich.progress.Progress(name, rich.progress.BarColumn(), share, console=console,
-                                  transient=True, redirect_stdout=False)
+    return rich.progress.Progress(
+        name,
+        rich.progress.BarColumn(),
+        share,
+        console=console,
+        transient=True,
+        redirect_stdout=False,
+    )

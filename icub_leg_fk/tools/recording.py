@@ -19,7 +19,13 @@ from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.stream.configuration import DEFAULT_TIMEOUT
 from icub_leg_fk.stream.joint_input import JointInput, Look
 from icub_leg_fk.stream.notes import Note, notes_of
-from icub_leg_fk.tools.bags import DEFAULT_TOPIC, import_rosbags, JOINT_STATE, new_bag, open_bag
+from icub_leg_fk.tools.bags import (
+    DEFAULT_TOPIC,
+    import_rosbags,
+    JOINT_STATE,
+    new_bag,
+    open_bag,
+)
 from icub_leg_fk.tools.options import LARGEST, number
 from icub_leg_fk.tools.progress import Progress
 import numpy as np
@@ -31,7 +37,9 @@ EPOCH = 1e8  # s; times beyond it count from 1970 and not from the start
 _NANOSECONDS = 1_000_000_000  # in a second
 _ENCAPSULATION = b'\x00\x01\x00\x00'  # CDR, little-endian
 
-Messages = Iterable[tuple[int, bytes]]  # time of recording [ns] and CDR bytes of a JointState
+Messages = Iterable[
+    tuple[int, bytes]
+]  # time of recording [ns] and CDR bytes of a JointState
 
 
 @dataclass(frozen=True)
@@ -78,7 +86,9 @@ class ChainTrack:
     @cached_property
     def poses(self) -> Array:
         """(N, 7) rows x, y, z [m], qx, qy, qz, qw of the tip in the root frame."""
-        return self.chain.poses(self.positions) if self.received is None else self.received
+        return (
+            self.chain.poses(self.positions) if self.received is None else self.received
+        )
 
     def nearest(self, time: float) -> int:
         """Return the index of the sample nearest to a time [s]."""
@@ -111,8 +121,12 @@ def time_span(tracks: Sequence[ChainTrack]) -> tuple[float, float]:
     return first, last
 
 
-def read_tracks(path: str | Path, chains: Sequence[Chain], topic: str | None = None,
-                progress: Progress | None = None) -> Reading:
+def read_tracks(
+    path: str | Path,
+    chains: Sequence[Chain],
+    topic: str | None = None,
+    progress: Progress | None = None,
+) -> Reading:
     """Return what some chains did in a bag or a CSV file, by the node's own input rules.
 
     Args:
@@ -129,7 +143,9 @@ def read_tracks(path: str | Path, chains: Sequence[Chain], topic: str | None = N
     if Path(path).suffix.lower() != '.csv':
         with open_bag(path) as bag:
             connections = bag.joint_connections(topic)
-            messages = ((time, data) for _, time, data in bag.messages(connections, progress))
+            messages = (
+                (time, data) for _, time, data in bag.messages(connections, progress)
+            )
             tracks, look = _follow(messages, chains)
         return _reading(path, tracks, notes_of(look, connections[0].topic), bag.notes)
     if topic is not None:
@@ -140,8 +156,9 @@ def read_tracks(path: str | Path, chains: Sequence[Chain], topic: str | None = N
     return _reading(path, tracks, notes_of(look), [])
 
 
-def _follow(messages: Messages, chains: Sequence[Chain], start: int | None = None
-            ) -> tuple[dict[str, ChainTrack], Look]:
+def _follow(
+    messages: Messages, chains: Sequence[Chain], start: int | None = None
+) -> tuple[dict[str, ChainTrack], Look]:
     """Return what chains do by some messages, by name, and what there is to see of these.
 
     Times count from `start` [ns], or from the first pose.
@@ -156,27 +173,37 @@ def _follow(messages: Messages, chains: Sequence[Chain], start: int | None = Non
             stamps[ready.chain.name].append(ready.stamp)
             positions[ready.chain.name].extend(ready.positions)
     if start is None:
-        start = min((of_chain[0] for of_chain in stamps.values() if of_chain), default=0)
+        start = min(
+            (of_chain[0] for of_chain in stamps.values() if of_chain), default=0
+        )
     tracks = {}
     for chain in chains:
-        times = (np.frombuffer(stamps[chain.name], dtype=np.int64) - start) / _NANOSECONDS
+        times = (
+            np.frombuffer(stamps[chain.name], dtype=np.int64) - start
+        ) / _NANOSECONDS
         q = np.frombuffer(positions[chain.name]).reshape(-1, chain.n)
         tracks[chain.name] = ChainTrack(chain, times, q)
     return tracks, joint_input.take_look()
 
 
-def _reading(path: str | Path, tracks: Mapping[str, ChainTrack], warnings: Sequence[Note],
-             notes: Sequence[str]) -> Reading:
+def _reading(
+    path: str | Path,
+    tracks: Mapping[str, ChainTrack],
+    warnings: Sequence[Note],
+    notes: Sequence[str],
+) -> Reading:
     """Return the tracks that have poses, and of the others why they have none."""
-    faults = {name: [note.text for note in warnings if note.chain in ('', name)]
-              for name, track in tracks.items() if not len(track.times)}
-    poseless = [f'{name} has no pose: {"; ".join(texts) or "no message has any positions"}'
-                for name, texts in faults.items()]
-    if len(poseless) == len(tracks):
-        raise InputFileError(str(path), '; '.join(poseless))
-    said = [str(note) for note in warnings if note.chain not in faults]
-    drawn = [track for name, track in tracks.items() if name not in faults]
-    return Reading(drawn, said + poseless, list(notes))
+    drawn = [track for track in tracks.values() if len(track.times)]
+    if not drawn:
+        faults = [str(note) for note in warnings] or ['no message of joint states']
+        raise InputFileError(str(path), f'no chain has a pose: {"; ".join(faults)}')
+    lines = []
+    for note in warnings:
+        is_drawn = note.chain == '' or len(tracks[note.chain].times)
+        lines.append(
+            str(note) if is_drawn else f'{note.chain} has no pose: {note.text}'
+        )
+    return Reading(drawn, lines, list(notes))
 
 
 def read_csv(path: str | Path, joint_names: Iterable[str]) -> JointRecording:
@@ -200,11 +227,15 @@ def read_csv(path: str | Path, joint_names: Iterable[str]) -> JointRecording:
     except OSError as error:
         raise InputFileError(str(path), f'cannot be read: {error.strerror}') from error
     except (UnicodeDecodeError, csv.Error) as error:
-        raise InputFileError(str(path), f'is not CSV text ({error}); allowed: a header and rows '
-                                        'of numbers') from error
+        raise InputFileError(
+            str(path),
+            f'is not CSV text ({error}); allowed: a header and rows of numbers',
+        ) from error
     table = np.frombuffer(values).reshape(-1, 1 + len(joints))
     if not len(table):
-        raise InputFileError(str(path), 'no rows; allowed: at least one after the header')
+        raise InputFileError(
+            str(path), 'no rows; allowed: at least one after the header'
+        )
     times = table[:, 0]
     if times[0] > EPOCH:
         times = times - times[0]
@@ -235,21 +266,26 @@ class _Rows:
                 continue
             numbers = self._numbers(row)
             if numbers[0] < before:
-                raise self._fault(f'column {self._names[0]}: {numbers[0]} after {before}',
-                                  'times in order')
+                raise self._fault(
+                    f'column {self._names[0]}: {numbers[0]} after {before}',
+                    'times in order',
+                )
             before = numbers[0]
             yield numbers
 
     def _numbers(self, row: Sequence[str]) -> list[float]:
         if len(row) != self._width:
-            raise self._fault(f'{len(row)} values under {self._width} columns',
-                              'one value per column')
+            raise self._fault(
+                f'{len(row)} values under {self._width} columns', 'one value per column'
+            )
         numbers = [number(row[place]) for place in self._places]
         largest = sys.float_info.max  # of the time, which stands first
         for name, place, value in zip(self._names, self._places, numbers):
             if not abs(value) <= largest:
-                raise self._fault(f'column {name}: {row[place]!r}',
-                                  f'a finite number up to {LARGEST:g}')
+                raise self._fault(
+                    f'column {name}: {row[place]!r}',
+                    f'a finite number up to {LARGEST:g}',
+                )
             largest = LARGEST
         return numbers
 
@@ -259,15 +295,18 @@ class _Rows:
         for name in TIMES:
             if name in header:
                 return name
-        raise self._fault(f'no column of times in the header ({_shown(header)})',
-                          ' or '.join(TIMES))
+        raise self._fault(
+            f'no column of times in the header ({_shown(header)})', ' or '.join(TIMES)
+        )
 
     def _place(self, header: Sequence[str], name: str) -> int:
         """Return where a column is."""
         if header.count(name) != 1:
             found = 'appears twice' if name in header else 'is missing'
-            raise self._fault(f'column {name} {found} in the header ({_shown(header)})',
-                              ', '.join(self._names))
+            raise self._fault(
+                f'column {name} {found} in the header ({_shown(header)})',
+                ', '.join(self._names),
+            )
         return header.index(name)
 
     def _fault(self, found: str, allowed: str) -> InputFileError:
