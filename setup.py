@@ -22,6 +22,7 @@ TOOLS = [
 ]
 TEST = [
     'colcon-common-extensions',
+    'cyclonedds>=11,<12',
     'distributed',
     'example-robot-data',
     'hypothesis',

@@ -5,8 +5,8 @@ import sys
 
 from icub_leg_fk.commands.plot import default_instants
 from icub_leg_fk.kinematics import config_file, load_chain
+from icub_leg_fk.stream.colors import color_of
 from icub_leg_fk.tools.drawing import (
-    color_of,
     FAINT,
     feet_figure,
     new_figure,

@@ -8,9 +8,7 @@ from pathlib import Path
 import sys
 
 from icub_leg_fk.errors import InputFileError, LegFKError
-from icub_leg_fk.kinematics import Catalog, Chain
 from icub_leg_fk.kinematics.rotation import Array
-from icub_leg_fk.stream.configuration import LEGS
 from icub_leg_fk.tools import options
 from icub_leg_fk.tools.drawing import check_output, feet_figure, LETTERS, save_picture
 from icub_leg_fk.tools.progress import shown_progress
@@ -86,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
             args.input,
             'there is no such file or directory; allowed: a bag or a CSV file',
         )
-    chains = _chosen_chains(options.load_catalog(args), args)
+    chains = options.chains_of_one_root(args)
     with shown_progress(name) as progress:
         reading = read_tracks(args.input, chains, args.joint_topic, progress)
     tracks = _between(reading.tracks, args.begin, args.end)
@@ -140,19 +138,7 @@ def _extreme_near(times: Array, distance: Array, near: float) -> float:
     return float(like[np.abs(like - near).argmin()])
 
 
-def _chosen_chains(catalog: Catalog, args: argparse.Namespace) -> list[Chain]:
-    """Return the chains asked for, or both legs, or else all that the catalog has."""
-    legs = [name for name in LEGS if name in catalog.chains]
-    chains = catalog.select(args.chains or legs or list(catalog.chains), args.version)
-    roots = sorted({chain.root_frame for chain in chains})
-    if len(roots) > 1:
-        raise LegFKError(
-            f'--chains: found the root frames {", ".join(roots)}, allowed: chains of '
-            'one root frame'
-        )
-    if args.foot_frame is None:
-        return list(chains)
-    return [chain.with_frame(args.foot_frame) for chain in chains]
+
 
 
 def _between(

@@ -10,7 +10,6 @@ import webbrowser
 
 from icub_leg_fk.errors import InputFileError, LegFKError
 from icub_leg_fk.kinematics import Chain
-from icub_leg_fk.stream.configuration import LEGS
 from icub_leg_fk.tools import options
 from icub_leg_fk.tools.progress import shown_progress
 from icub_leg_fk.tools.recording import read_tracks
@@ -61,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     """Show the page until a signal ends it."""
     if args.joint_topic is not None and not (args.recording or args.live):
         raise LegFKError('--joint-topic goes with --recording or --live')
-    chains = _chosen_chains(args)
+    chains = options.chains_of_one_root(args)
     with ExitStack() as stack:
         server = stack.enter_context(running_server(args.host, args.port))
         source: Source | None = None
@@ -74,20 +73,6 @@ def run(args: argparse.Namespace) -> int:
         _announce(chains, args, server.get_port())
         viewer.run()
     return 0
-
-
-def _chosen_chains(args: argparse.Namespace) -> list[Chain]:
-    """Return the chains asked for, or both legs, or else all that the catalog has."""
-    catalog = options.load_catalog(args)
-    legs = [name for name in LEGS if name in catalog.chains]
-    chains = catalog.select(args.chains or legs or [*catalog.chains], args.version)
-    roots = sorted({chain.root_frame for chain in chains})
-    if len(roots) > 1:
-        raise LegFKError(f'the chains have the root frames {", ".join(roots)}; allowed: chains of '
-                         'one root frame')
-    if args.foot_frame is None:
-        return list(chains)
-    return [chain.with_frame(args.foot_frame) for chain in chains]
 
 
 def _recording(path: Path, chains: Sequence[Chain], topic: str | None

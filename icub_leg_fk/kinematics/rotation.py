@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 _ROUNDING = 2e-15  # what cosine and sine may be off at right angles within two turns
+_EXACT = 1e-15  # below it an entry of a rotation matrix is 0 but for rounding
 _LIKELY = 1e-6  # components of a unit quaternion that differ by less may be equal but for rounding
 
 
@@ -83,6 +84,20 @@ def turns_about(axis: Array, angle: ArrayLike) -> Array:
     K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     cos, sin = cos_sin(np.asarray(angle, dtype=float)[..., None, None])
     return np.asarray(np.eye(3) + sin * K + (1 - cos) * (K @ K))
+
+
+def roll_pitch_yaw(R: Array) -> Array:
+    """Return the (3,) angles [rad] of a (3, 3) rotation Rz(yaw) Ry(pitch) Rx(roll), as in URDF.
+
+    The yaw is taken out before the other two angles are read off, so they are as accurate at
+    pitch = pi/2, where any yaw would do and 0 is taken, as elsewhere.
+    """
+    is_upright = math.hypot(R[0, 0], R[1, 0]) < _EXACT
+    yaw = 0.0 if is_upright else math.atan2(R[1, 0], R[0, 0])
+    c, s = math.cos(yaw), math.sin(yaw)
+    pitch = math.atan2(-R[2, 0], c * R[0, 0] + s * R[1, 0])
+    roll = math.atan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
+    return np.array([roll, pitch, yaw])
 
 
 def angle_between(one: Array, two: Array) -> Array:

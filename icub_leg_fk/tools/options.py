@@ -9,6 +9,7 @@ from typing import Any
 
 from icub_leg_fk.errors import JointVectorError, LegFKError, UnknownNameError
 from icub_leg_fk.kinematics import Catalog, Chain, ChainEntry
+from icub_leg_fk.stream.configuration import LEGS
 
 LARGEST = 1e9  # of a joint position; beyond it a float's last turn is lost anyway
 
@@ -78,6 +79,25 @@ def load_chain(args: argparse.Namespace) -> tuple[Catalog, Chain]:
     catalog = load_catalog(args)
     with advice_on_chains(catalog):
         return catalog, catalog.chain(args.chain, args.version, args.foot_frame)
+
+
+def chains_of_one_root(args: argparse.Namespace) -> list[Chain]:
+    """Return the chains asked for, or both legs, or else all of the file.
+
+    Raises:
+        LegFKError: they have several root frames.
+    """
+    catalog = load_catalog(args)
+    legs = [name for name in LEGS if name in catalog.chains]
+    with advice_on_chains(catalog):
+        chains = catalog.select(args.chains or legs or catalog.chains, args.version)
+    roots = sorted({chain.root_frame for chain in chains})
+    if len(roots) > 1:
+        raise LegFKError(f'the chains have the root frames {", ".join(roots)}; allowed: chains of '
+                         'one root frame')
+    if not args.foot_frame:
+        return list(chains)
+    return [chain.with_frame(args.foot_frame) for chain in chains]
 
 
 @contextmanager

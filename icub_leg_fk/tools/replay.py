@@ -12,9 +12,10 @@ import tempfile
 import time
 from typing import Any, IO
 
-from icub_leg_fk.errors import LegFKError, MissingDependencyError
+from icub_leg_fk.errors import LegFKError
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.tools.recording import JointRecording
+from icub_leg_fk.tools.ros import import_ros
 from icub_leg_fk.tools.signals import held_signals
 import numpy as np
 
@@ -126,7 +127,7 @@ class Replay:
     """
 
     def __init__(self, recording: JointRecording, namespace: str, tips: Sequence[str]) -> None:
-        rclpy, joint_state, pose_stamped = _import_rclpy()
+        rclpy, joint_state, pose_stamped = import_ros('the demonstration')
         count = len(recording.times)
         self.answers = [Answers(tip, np.full((count, 7), np.nan), np.full(count, np.nan))
                         for tip in tips]
@@ -248,19 +249,3 @@ class Replay:
         with held_signals():
             self._publisher.publish(data)
         return data
-
-
-def _import_rclpy() -> tuple[Any, Any, Any]:
-    """Return rclpy, JointState and PoseStamped."""
-    try:
-        from geometry_msgs.msg import PoseStamped
-        import rclpy.context
-        import rclpy.executors
-        import rclpy.serialization
-        import rclpy.signals
-        from sensor_msgs.msg import JointState
-    except ImportError as error:
-        raise MissingDependencyError(
-            'rclpy', 'the demonstration',
-            'source ROS 2, or pip install "icub_leg_fk[ros]"') from error
-    return rclpy, JointState, PoseStamped

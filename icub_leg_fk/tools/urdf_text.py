@@ -14,7 +14,7 @@ from xml.etree import ElementTree as ET
 
 from icub_leg_fk.errors import LegFKError
 from icub_leg_fk.kinematics import Chain, DHLink, Row
-from icub_leg_fk.kinematics.rotation import Array
+from icub_leg_fk.kinematics.rotation import Array, roll_pitch_yaw
 import numpy as np
 
 _PLACEHOLDER = '50000'  # effort and velocity, which URDF demands and no table gives
@@ -48,20 +48,6 @@ def urdf_text(robot: str, chains: Sequence[Chain]) -> str:
         model.add(chain)
     return model.text()
 
-
-def xyz_rpy(T: Array) -> tuple[Array, Array]:
-    """Return a transform as URDF has it: translation [m], and roll, pitch, yaw [rad].
-
-    R = Rz(yaw) Ry(pitch) Rx(roll). The yaw is taken out before the other two angles are read off,
-    so they are as accurate at pitch = pi/2, where any yaw would do, as elsewhere.
-    """
-    R = T[:3, :3]
-    is_locked = math.hypot(R[0, 0], R[1, 0]) < 1e-15
-    yaw = 0.0 if is_locked else math.atan2(R[1, 0], R[0, 0])
-    c, s = math.cos(yaw), math.sin(yaw)
-    pitch = math.atan2(-R[2, 0], c * R[0, 0] + s * R[1, 0])
-    roll = math.atan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
-    return T[:3, 3], np.array([roll, pitch, yaw])
 
 
 class _Model:
@@ -210,7 +196,7 @@ def _limits(joint: _Joint, driver: DHLink) -> tuple[float, float]:
 
 
 def _place(joint: ET.Element, origin: Array, parent: str, child: str) -> None:
-    _add_origin(joint, *xyz_rpy(origin))
+    _add_origin(joint, origin[:3, 3], roll_pitch_yaw(origin[:3, :3]))
     ET.SubElement(joint, 'parent', link=parent)
     ET.SubElement(joint, 'child', link=child)
 

@@ -8,12 +8,13 @@ from threading import Lock, Thread
 import time
 from typing import Any
 
-from icub_leg_fk.errors import LegFKError, MissingDependencyError
+from icub_leg_fk.errors import LegFKError
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.stream.configuration import DEFAULT_TIMEOUT
 from icub_leg_fk.stream.joint_input import JointInput
 from icub_leg_fk.stream.notes import Note, notes_of
+from icub_leg_fk.tools.ros import import_ros
 from icub_leg_fk.tools.viewer_page import Changed, Posture
 import numpy as np
 
@@ -93,7 +94,7 @@ def live_joints(chains: Sequence[Chain], topic: str) -> Iterator[LiveJoints]:
         MissingDependencyError: rclpy is not installed.
         LegFKError: ROS 2 cannot be started, or the topic has no such name.
     """
-    rclpy, joint_state = _import_rclpy()
+    rclpy, joint_state, _ = import_ros('view --live')
     joints = LiveJoints(chains, topic)
     context = rclpy.context.Context()
     quality = rclpy.qos.QoSProfile(
@@ -126,18 +127,3 @@ def live_joints(chains: Sequence[Chain], topic: str) -> Iterator[LiveJoints]:
         context.try_shutdown()
         thread.join()
         node.destroy_node()
-
-
-def _import_rclpy() -> tuple[Any, Any]:
-    """Return rclpy and JointState."""
-    try:
-        import rclpy.context
-        import rclpy.exceptions
-        import rclpy.executors
-        import rclpy.qos
-        import rclpy.signals
-        from sensor_msgs.msg import JointState
-    except ImportError as error:
-        raise MissingDependencyError(
-            'rclpy', 'view --live', 'source ROS 2, or pip install "icub_leg_fk[ros]"') from error
-    return rclpy, JointState

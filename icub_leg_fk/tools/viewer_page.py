@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from icub_leg_fk.errors import LegFKError, MissingDependencyError
 from icub_leg_fk.kinematics import Chain, chain_text, DHLink
-from icub_leg_fk.kinematics.rotation import Array
+from icub_leg_fk.kinematics.rotation import Array, roll_pitch_yaw
 from icub_leg_fk.tools import text
 from icub_leg_fk.tools.signals import held_signals
 from icub_leg_fk.tools.viewer_scene import Dots, Label, Lines, PosedChain, Scene
@@ -283,16 +283,3 @@ def _numbers(values: Iterable[float], decimals: int = 7) -> list[str]:
 
 def _named(names: Sequence[str], values: Sequence[str]) -> str:
     return '  '.join(f'{name} {value:>10}' for name, value in zip(names, values, strict=True))
-
-
-def roll_pitch_yaw(R: Array) -> tuple[float, float, float]:
-    """Return the angles [rad] of R = Rz(yaw) Ry(pitch) Rx(roll), as URDF has them.
-
-    Where pitch is a right angle any yaw would do; it is 0 then.
-    """
-    is_upright = math.hypot(R[0, 0], R[1, 0]) < 1e-9
-    yaw = 0.0 if is_upright else math.atan2(R[1, 0], R[0, 0])
-    c, s = math.cos(yaw), math.sin(yaw)
-    pitch = math.atan2(-R[2, 0], c * R[0, 0] + s * R[1, 0])
-    roll = math.atan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
-    return roll, pitch, yaw

@@ -26,9 +26,6 @@ OPTIONAL = ['argcomplete', 'matplotlib', 'mpl_toolkits', 'rich', 'rosbags', 'sym
 ROS = ['rclpy', 'rcl_interfaces', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs',
        'sensor_msgs', 'std_msgs', 'tf2_msgs', 'visualization_msgs']
 
-# To go when what it marks is as it should be.
-not_yet = pytest.mark.xfail(strict=True)
-
 # Runs the program that follows as if the libraries named were not installed.
 WITHOUT = """
 import sys
@@ -169,7 +166,7 @@ def functions_that_import(library: str) -> list[str]:
     'rclpy',
     'rich',
     'rosbags',
-    pytest.param('sympy', marks=not_yet),
+    'sympy',
     'viser',
 ])
 def test_an_optional_library_is_imported_in_one_function(library: str) -> None:
