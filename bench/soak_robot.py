@@ -72,8 +72,10 @@ class SoakRobot:
         self._fault = 'start'
         self._turns = self._all_turns()
         catalog = Catalog.load()
-        self._chains = {foot: [catalog.chain(chain, version, frame) for version in VERSIONS
-                               for frame in FOOT_FRAMES] for foot, chain in FEET.items()}
+        self._chains = {}
+        for foot, chain in FEET.items():
+            self._chains[foot] = [catalog.chain(chain, version, frame)
+                                  for version in VERSIONS for frame in FOOT_FRAMES]
         self._promised: dict[str, deque[Promise]] = {foot: deque() for foot in FEET}
         self.kept = dict.fromkeys(FEET, 0)
         self.latencies: list[float] = []
@@ -180,12 +182,9 @@ class SoakRobot:
             'subscriber comes or goes': self._subscriber,
             'frame prefix change': self._change('frame_prefix', itertools.cycle(('a/', ''))),
             'other joints': 100 * [('others', _NONE), good],
-            'chains change': self._change('chains', itertools.cycle(
-                (['right_leg', 'left_leg'], ['left_leg', 'right_leg']))),
             'skeletons on or off': self._change('publish_markers', itertools.cycle((True, False))),
             'twists on or off': self._change('publish_twist', itertools.cycle((True, False))),
-            'kinematics file change': self._change(
-                'kinematics_file', itertools.cycle((Catalog.load().file, ''))),
+            'joint timeout change': self._change('joint_timeout', itertools.cycle((1.0, 0.5))),
         }
         for self._fault, fault in itertools.cycle(faults.items()):
             self.faults[self._fault] += 1

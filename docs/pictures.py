@@ -3,9 +3,9 @@
 from pathlib import Path
 import sys
 
+from icub_leg_fk.commands.plot import default_instants
 from icub_leg_fk.kinematics import Catalog, config_file
 from icub_leg_fk.tools.drawing import color_of, FAINT, feet_figure, save_picture, Space
-from icub_leg_fk.commands.plot import default_instants
 from icub_leg_fk.tools.recording import read_csv
 import numpy as np
 

@@ -60,10 +60,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Give the demonstration; return 1 if a pose is missing or the node failed."""
-    if args.output is None:
-        args.output, args.force = _DEFAULT_PICTURE, True
-    picture = Path(args.output)
-    check_output(picture, args.force)
+    picture = Path(args.output or _DEFAULT_PICTURE)
+    may_replace = args.force or args.output is None
+    check_output(picture, may_replace)
     if args.save:
         import_rosbags()
         check_target(args.save, force=args.force, may_replace=is_bag)
@@ -76,7 +75,11 @@ def run(args: argparse.Namespace) -> int:
         return 1
     status = conclude(replay.answers, recording.times[:len(replay.sent)].tolist(), is_whole)
     if is_whole and all(answers.arrived for answers in replay.answers):
-        _draw(recording, chains, replay.answers, args)
+        tracks = _tracks(recording, chains, replay.answers)
+        name = args.recording.name if args.recording else 'synthetic gait'
+        title = f'{name}   {chains[0].version}'
+        save_picture(lambda: feet_figure(tracks, default_instants(tracks), title), picture,
+                     force=may_replace)
         print(f'picture       {picture}', flush=True)
     if is_whole and args.save:
         recordings.write_joint_states(args.save, replay.sent, force=args.force)
@@ -122,17 +125,14 @@ def _play(recording: JointRecording, chains: Sequence[Chain]) -> tuple[Replay, b
     return replay, True
 
 
-def _draw(recording: JointRecording, chains: Sequence[Chain], answers: Sequence[Answers],
-          args: argparse.Namespace) -> None:
-    """Draw the poses that have come."""
+def _tracks(recording: JointRecording, chains: Sequence[Chain], answers: Sequence[Answers]
+            ) -> list[recordings.ChainTrack]:
+    """Return the chains with the poses that have come."""
     tracks = []
     for chain, received in zip(chains, answers, strict=True):
         track = replace(recording.track(chain), received=received.poses)
         tracks.append(track.where(np.isfinite(received.latencies)))
-    name = args.recording.name if args.recording else 'synthetic gait'
-    title = f'{name}   {chains[0].version}'
-    save_picture(lambda: feet_figure(tracks, default_instants(tracks), title), Path(args.output),
-                 force=args.force)
+    return tracks
 
 
 def conclude(answers: Sequence[Answers], times: Sequence[float], is_whole: bool) -> int:
@@ -190,7 +190,10 @@ class Display:
             self._rich = import_rich('the live table')
             console = self._rich.console.Console(markup=False, highlight=False)
             self._live = self._rich.live.Live(
-                console=console, screen=True, auto_refresh=False, redirect_stdout=False,
+                console=console,
+                screen=True,
+                auto_refresh=False,
+                redirect_stdout=False,
                 redirect_stderr=False)
         self.period = 0.1 if self._live else 1.0
 

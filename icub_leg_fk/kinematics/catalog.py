@@ -86,6 +86,11 @@ class Catalog(Frozen):
         chains = UrdfChains(urdf, start, cls.load().chains, tolerance)
         return cls(urdf.file, chains, doubts(urdf))
 
+    def known(self) -> list[str]:
+        """Return the names of the shipped chains that a URDF has, or of all chains of a file."""
+        chains = self.chains
+        return chains.known() if isinstance(chains, UrdfChains) else list(chains)
+
     def entry(self, chain: str) -> ChainEntry:
         """Return a chain with all its versions.
 

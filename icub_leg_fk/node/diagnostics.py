@@ -5,8 +5,8 @@ from collections.abc import Callable
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from icub_leg_fk.stream.joint_input import ChainCounts, JointInput, MESSAGE_REASONS
 from icub_leg_fk.node.signs_of_life import Second, SignsOfLife
+from icub_leg_fk.stream.joint_input import ChainCounts, JointInput, MESSAGE_REASONS
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 

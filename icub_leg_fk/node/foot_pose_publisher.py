@@ -2,13 +2,13 @@
 
 import time
 
-from icub_leg_fk.stream.configuration import Configuration
 from icub_leg_fk.node.diagnostics import Diagnostics
-from icub_leg_fk.stream.joint_input import JointInput
 from icub_leg_fk.node.outputs import Outputs
 from icub_leg_fk.node.parameters import NodeParameters
 from icub_leg_fk.node.qos_overrides import OVERRIDABLE
 from icub_leg_fk.node.signs_of_life import SignsOfLife, ThrottledWarnings
+from icub_leg_fk.stream.configuration import Configuration
+from icub_leg_fk.stream.joint_input import JointInput
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data

@@ -9,10 +9,10 @@ from typing import Any
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped, TwistStamped
+from icub_leg_fk.node.qos_overrides import OVERRIDABLE
 from icub_leg_fk.stream.configuration import Configuration
 from icub_leg_fk.stream.joint_input import Ready
 from icub_leg_fk.stream.pose_stream import PoseStream, Send, Senders
-from icub_leg_fk.node.qos_overrides import OVERRIDABLE
 from rclpy.event_handler import PublisherEventCallbacks, UnsupportedEventTypeError
 from rclpy.node import Node
 from rclpy.publisher import Publisher

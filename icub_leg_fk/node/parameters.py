@@ -6,13 +6,13 @@ from typing import Any, NamedTuple
 
 from icub_leg_fk.errors import closest, LegFKError, ParameterError
 from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.node.qos_overrides import check_qos_override, PREFIX
 from icub_leg_fk.stream.configuration import (
     Configuration,
     DEFAULT_TIMEOUT,
     LONGEST_TIMEOUT,
     STAMP_SOURCES,
 )
-from icub_leg_fk.node.qos_overrides import check_qos_override, PREFIX
 from rcl_interfaces.msg import (
     FloatingPointRange,
     ParameterDescriptor,

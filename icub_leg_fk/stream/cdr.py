@@ -37,6 +37,7 @@ class JointStateLayout(NamedTuple):
 
     Attributes:
         byte_order: `<` or `>`.
+        frame_id: frame id of the header.
         names: joint names.
         padding: offset and size of what is skipped for alignment up to the names' end.
         names_end: offset of the count of positions, which follows the names.
@@ -46,6 +47,7 @@ class JointStateLayout(NamedTuple):
     """
 
     byte_order: str
+    frame_id: str
     names: tuple[str, ...]
     padding: tuple[tuple[int, int], ...]
     names_end: int
@@ -63,13 +65,14 @@ def read_layout(data: bytes) -> JointStateLayout:
     """
     reader = _Reader(data)
     reader.take('header.stamp', 8)
-    reader.string('header.frame_id')
+    frame_id = reader.string('header.frame_id')
     # A string takes at least its length field: no more of them than a quarter of the rest.
     names = tuple([reader.string('name') for _ in range(reader.length('name', 4))])
     names_end = reader.align(4)
     padding = tuple(reader.padding)
-    return JointStateLayout(reader.byte_order, names, padding, names_end, *map(
-        reader.doubles, ('position', 'velocity', 'effort')))
+    positions, velocities, efforts = map(reader.doubles, ('position', 'velocity', 'effort'))
+    return JointStateLayout(reader.byte_order, frame_id, names, padding, names_end,
+                            positions, velocities, efforts)
 
 
 class _StampedEncoder:
@@ -153,7 +156,7 @@ class _Reader:
         return self._at
 
     def take(self, field: str, size: int) -> int:
-        """Return the present offset and go on behind as many bytes."""
+        """Return the present offset and pass over as many bytes."""
         start = self._at
         self._at = start + size
         if self._at > len(self._data):
@@ -178,7 +181,8 @@ class _Reader:
         start = self.take(field, size)
         text = self._data[start:self._at]
         if size and text.find(0) != size - 1:
-            raise MalformedMessageError('JointState', f'{field} is not a string that ends with NUL')
+            raise MalformedMessageError('JointState',
+                                        f'{field} is not a string that ends with NUL')
         return text[:-1].decode('utf-8', 'replace')
 
     def doubles(self, field: str) -> Doubles:
@@ -196,5 +200,5 @@ def _string(text: str) -> bytes:
 
 
 def _aligned(before: int, data: bytes, size: int) -> bytes:
-    """Return data, which so many bytes stand before, padded so that items of a size can follow."""
+    """Return data that starts after so many bytes, padded for items of a size to follow."""
     return data + bytes(-(before + len(data)) % size)

@@ -7,7 +7,7 @@ import math
 import sys
 from typing import Any
 
-from icub_leg_fk.errors import JointVectorError, UnknownNameError
+from icub_leg_fk.errors import JointVectorError, LegFKError, UnknownNameError
 from icub_leg_fk.kinematics import Catalog, Chain, ChainEntry
 
 LARGEST = 1e9  # of a joint position; beyond it a float's last turn is lost anyway
@@ -33,7 +33,10 @@ def add_joint_positions(parser: argparse.ArgumentParser, *, required: bool) -> N
     group = parser.add_mutually_exclusive_group(required=required)
     for unit in ('degrees', 'radians'):
         group.add_argument(
-            f'--{unit}', metavar='Q', nargs='+', type=_joint_position,
+            f'--{unit}',
+            metavar='Q',
+            nargs='+',
+            type=_joint_position,
             help=f'joint positions in {unit}, root to tip; of a prismatic joint always in metres')
 
 
@@ -60,6 +63,10 @@ def number_between(low: float, high: float, allowed: str = '') -> Callable[[str]
 
 def load_catalog(args: argparse.Namespace) -> Catalog:
     """Return the catalog that `-k` names, with a line on stderr for each of its warnings."""
+    for option in ('kinematics_file', 'version', 'foot_frame'):
+        if getattr(args, option, None) == '':  # as an unset variable of the shell leaves it
+            words = option.replace('_', '-')
+            raise LegFKError(f'--{words} is empty; leave it out for its default')
     catalog = Catalog.load(args.kinematics_file)
     for line in catalog.warnings:
         print(f'leg_fk: warning: {line}', file=sys.stderr)
@@ -114,12 +121,12 @@ _position_in_bounds = number_between(
 
 
 def _warn_of_degrees(chain: Chain, q: list[float]) -> None:
-    """Warn of angles [rad] that are more than a turn beyond their range, as the node does."""
+    """Warn of angles [rad] that are outside their range and more than a turn."""
+    outside = chain.out_of_range(q)
     doubtful = []
     for name, link, value in zip(chain.joint_names, chain.joints, q, strict=True):
-        lower, upper = link.limits
-        beyond = max(lower - value, value - upper)
-        if not link.is_prismatic and min(abs(value), beyond) > 2 * math.pi:
+        is_turns = not link.is_prismatic and abs(value) > 2 * math.pi
+        if name in outside and is_turns:
             doubtful.append(f'{name} {value:g}')
     if doubtful:
         print(f'leg_fk: warning: positions look like degrees, for which there is --degrees: '
@@ -136,13 +143,6 @@ def _owner(catalog: Catalog, name: str) -> str:
                 if name == tip_frame.frame_id:
                     return f'{name} is {entry.name} with --foot-frame {frame}'
     return ''
-
-
-def _not_empty(text: str) -> str:
-    """Refuse what is left of an unset variable of the shell."""
-    if not text:
-        raise argparse.ArgumentTypeError('found nothing; leave the option out for its default')
-    return text
 
 
 def _complete_chain(prefix: str, parsed_args: argparse.Namespace, **_: Any) -> list[str]:
@@ -199,11 +199,9 @@ _OPTIONS: dict[str, dict[str, Any]] = {
         'help': 'chains, such as left_leg or head_imu=v2 (default: both legs)'},
     '--version': {
         'metavar': 'VERSION',
-        'type': _not_empty,
         'help': "of the chains named without one (default: the file's)"},
     '--foot-frame': {
         'metavar': 'FRAME',
-        'type': _not_empty,
         'help': "axes of the tip: of the iCub's feet dh, the table's last frame (the default), "
                 'or sole, x forward, y left, z up'},
     '--joint-topic': {
@@ -215,7 +213,6 @@ _OPTIONS: dict[str, dict[str, Any]] = {
         'help': 'print JSON, for programs'},
     '--kinematics-file': {
         'metavar': 'FILE',
-        'type': _not_empty,
         'help': "a kinematics file, with the DH tables of any robot (default: the iCub's, as "
                 'shipped)'},
     '--force': {

@@ -19,7 +19,10 @@ import numpy as np
 
 _PLACEHOLDER = '50000'  # effort and velocity, which URDF demands and no table gives
 _COLOURS = {'bone': '0.82 0.82 0.85 1', 'joint': '0.25 0.27 0.32 1', 'tip': '0.90 0.45 0.10 1'}
-_BONE_RADIUS, _JOINT_RADIUS, _TIP_RADIUS, _SOLE_THICKNESS = 0.012, 0.022, 0.015, 0.02  # m
+_BONE_RADIUS = 0.012  # m
+_JOINT_RADIUS = 0.022  # m
+_TIP_RADIUS = 0.015  # m
+_SOLE_THICKNESS = 0.02  # m
 _NOWHERE = np.zeros(3)
 _SAME_AXIS = 1e-9  # m, and each entry of the axis
 
@@ -137,11 +140,12 @@ class _Model:
         if joint.link.erratum:
             _comment(element, f'Erratum of the printed table: {joint.link.erratum}')
         if joint.mimicked:
-            ET.SubElement(element, 'mimic', joint=joint.mimicked,
-                          multiplier=repr(joint.link.gain))
+            multiplier = repr(joint.link.gain)
+            ET.SubElement(element, 'mimic', joint=joint.mimicked, multiplier=multiplier)
         if is_limited:
-            ET.SubElement(element, 'limit', lower=repr(lower), upper=repr(upper),
-                          effort=_PLACEHOLDER, velocity=_PLACEHOLDER)
+            limit = ET.SubElement(element, 'limit', lower=repr(lower), upper=repr(upper))
+            limit.set('effort', _PLACEHOLDER)
+            limit.set('velocity', _PLACEHOLDER)
         body = ET.SubElement(self._robot, 'link', name=_link_name(name))
         _draw(body, 'joint', 'sphere', radius=_JOINT_RADIUS)
         _draw_bone(body, joint.link.transform())
@@ -150,8 +154,8 @@ class _Model:
         frames = chain.tip_frames.values()
         has_sole = any(frame.outline is not None for frame in frames)
         for frame in frames:
-            joint = ET.SubElement(self._robot, 'joint', name=f'{frame.frame_id}_joint',
-                                  type='fixed')
+            name = f'{frame.frame_id}_joint'
+            joint = ET.SubElement(self._robot, 'joint', name=name, type='fixed')
             _place(joint, origin @ frame.T_tip_frame, parent, frame.frame_id)
             tip = ET.SubElement(self._robot, 'link', name=frame.frame_id)
             if not has_sole:

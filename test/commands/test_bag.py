@@ -5,6 +5,11 @@ from pathlib import Path
 import pickle
 import re
 
+from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.tools import recording
+from icub_leg_fk.tools.add_poses import add_foot_poses
+import numpy as np
+import pytest
 from support.bag_files import (
     ENDINGS,
     entries,
@@ -24,12 +29,7 @@ from support.bag_files import (
     walk,
     write_bag,
 )
-from icub_leg_fk.kinematics import Catalog
-from icub_leg_fk.tools import recording
-from icub_leg_fk.tools.add_poses import add_foot_poses
 from support.leg_fk_process import assert_one_line_complaint, leg_fk
-import numpy as np
-import pytest
 import yaml
 
 TWIST = 'geometry_msgs/msg/TwistStamped'

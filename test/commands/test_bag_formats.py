@@ -3,6 +3,7 @@
 from collections import Counter
 import sqlite3
 
+import pytest
 from support.bag_files import (
     joint_state,
     LEFT_POSE,
@@ -16,7 +17,6 @@ from support.bag_files import (
     write_bag,
 )
 from support.leg_fk_process import leg_fk
-import pytest
 
 ADDED = {LEFT_POSE: POSE, RIGHT_POSE: POSE,
          '/foot_pose_publisher/left_foot/twist': 'geometry_msgs/msg/TwistStamped',

@@ -7,6 +7,10 @@ the tool adds to the bag as bytes.
 import math
 import random
 
+from geometry_msgs.msg import PoseStamped
+from icub_leg_fk.tools.add_poses import add_foot_poses
+import numpy as np
+import pytest
 from support.bag_files import (
     joint_state,
     LEGS,
@@ -18,12 +22,8 @@ from support.bag_files import (
     START,
     write_bag,
 )
-from geometry_msgs.msg import PoseStamped
-from icub_leg_fk.tools.add_poses import add_foot_poses
 from support.leg_fk_process import leg_fk
 from support.node_harness import FEET, LOSSLESS, NodeProcess, Robot
-import numpy as np
-import pytest
 from support.recorded_walk import DATA
 
 BURST = 50

@@ -10,9 +10,9 @@ import subprocess
 import sys
 import time
 
+import pytest
 from support.bag_files import entries, read_bag, walk, write_bag
 from support.leg_fk_process import assert_one_line_complaint, COMMAND, leg_fk
-import pytest
 
 DEADLINE = 60.0  # s
 

@@ -3,6 +3,8 @@
 import json
 import re
 
+import numpy as np
+import pytest
 from support.explain_cases import (
     every_chain,
     EXAMPLES,
@@ -12,8 +14,6 @@ from support.explain_cases import (
     positions,
 )
 from support.leg_fk_process import assert_one_line_complaint, leg_fk
-import numpy as np
-import pytest
 
 
 @every_chain

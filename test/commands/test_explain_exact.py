@@ -5,6 +5,9 @@ import re
 import subprocess
 import sys
 
+from icub_leg_fk.kinematics import Catalog
+import numpy as np
+import pytest
 from support.explain_cases import (
     EXAMPLES,
     explain,
@@ -13,9 +16,6 @@ from support.explain_cases import (
     one_chain_of_each_kind,
     positions,
 )
-from icub_leg_fk.kinematics import Catalog
-import numpy as np
-import pytest
 
 sympy = pytest.importorskip('sympy')
 

@@ -7,13 +7,13 @@ import sys
 from xml.etree import ElementTree
 import zlib
 
-from icub_leg_fk.kinematics import Catalog, config_file
 from icub_leg_fk.__main__ import main
 from icub_leg_fk.commands.plot import default_instants
+from icub_leg_fk.kinematics import Catalog, config_file
 from icub_leg_fk.tools.recording import ChainTrack, read_csv
-from support.leg_fk_process import assert_one_line_complaint, leg_fk
 import numpy as np
 import pytest
+from support.leg_fk_process import assert_one_line_complaint, leg_fk
 
 pytest.importorskip('matplotlib')
 drawing = pytest.importorskip('icub_leg_fk.tools.drawing')

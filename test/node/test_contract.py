@@ -5,12 +5,23 @@ import sys
 
 from geometry_msgs.msg import PoseStamped
 from icub_leg_fk.kinematics.catalog import config_file
-from support.node_harness import BOTH, DEEP, FEET, HEAD, LEFT, LOSSLESS, NodeProcess, RIGHT, Robot, SECOND
-from support.node_oracle import assert_same_pose, oracle_pose
 import numpy as np
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
+from support.node_harness import (
+    BOTH,
+    DEEP,
+    FEET,
+    HEAD,
+    LEFT,
+    LOSSLESS,
+    NodeProcess,
+    RIGHT,
+    Robot,
+    SECOND,
+)
+from support.node_oracle import assert_same_pose, oracle_pose
 
 ANGLES = {name: 0.03 * (i + 1) * (-1) ** i for i, name in enumerate(BOTH)}
 

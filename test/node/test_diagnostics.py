@@ -5,8 +5,8 @@ import time
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import TwistStamped
-from support.node_harness import BOTH, LEFT, LOSSLESS, nanoseconds, NodeProcess, Robot, SECOND
 import pytest
+from support.node_harness import BOTH, LEFT, LOSSLESS, nanoseconds, NodeProcess, Robot, SECOND
 
 MS = 1_000_000  # ns
 OK, WARN, ERROR, STALE = (DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR,

@@ -3,9 +3,9 @@
 import signal
 
 from diagnostic_msgs.msg import DiagnosticStatus
+import pytest
 from support.node_harness import BOTH, FEET, LEFT, LOSSLESS, NodeProcess, Robot
 from support.node_oracle import assert_same_pose, oracle_pose
-import pytest
 
 MS = 1_000_000  # ns
 

@@ -3,11 +3,21 @@
 import math
 import time
 
-from support.node_harness import BOTH, DEEP, HEAD, LEFT, LOSSLESS, NodeProcess, RIGHT, Robot, SECOND
-from support.node_oracle import assert_same_pose, oracle_pose
 import pytest
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
+from support.node_harness import (
+    BOTH,
+    DEEP,
+    HEAD,
+    LEFT,
+    LOSSLESS,
+    NodeProcess,
+    RIGHT,
+    Robot,
+    SECOND,
+)
+from support.node_oracle import assert_same_pose, oracle_pose
 
 MS = 1_000_000  # ns
 Q = [0.1 * (i + 1) * (-1) ** i for i in range(12)]

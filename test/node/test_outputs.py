@@ -2,11 +2,11 @@
 
 from geometry_msgs.msg import TwistStamped
 from icub_leg_fk.kinematics import Catalog
-from support.node_harness import BOTH, FEET, LOSSLESS, NodeProcess, Robot, SECOND
-from support.node_oracle import oracle_jacobian, oracle_pose, pose_matrix
 import numpy as np
 import pytest
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from support.node_harness import BOTH, FEET, LOSSLESS, NodeProcess, Robot, SECOND
+from support.node_oracle import oracle_jacobian, oracle_pose, pose_matrix
 from visualization_msgs.msg import Marker, MarkerArray
 
 MS = 1_000_000  # ns

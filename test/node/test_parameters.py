@@ -2,12 +2,12 @@
 
 from geometry_msgs.msg import PoseStamped
 from icub_leg_fk.kinematics.catalog import config_file
-from support.node_harness import BOTH, FEET, HEAD, LEFT, LOSSLESS, NodeProcess, Robot, SECOND
-from support.node_oracle import assert_same_pose, oracle_pose
 import pytest
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterType, ParameterValue
 from rclpy.parameter import Parameter, parameter_value_to_python
+from support.node_harness import BOTH, FEET, HEAD, LEFT, LOSSLESS, NodeProcess, Robot, SECOND
+from support.node_oracle import assert_same_pose, oracle_pose
 
 MS = 1_000_000  # ns
 Q = [0.2, 0.1, -0.1, -0.5, -0.3, 0.1, 0.15, 0.05, 0.1, -0.4, -0.2, -0.1]

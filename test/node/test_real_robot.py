@@ -2,10 +2,10 @@
 
 import time
 
-from support.node_harness import FEET, LOSSLESS, NodeProcess, Robot, SECOND
-from support.node_oracle import oracle_pose, pose_matrix
 import numpy as np
 import pytest
+from support.node_harness import FEET, LOSSLESS, NodeProcess, Robot, SECOND
+from support.node_oracle import oracle_pose, pose_matrix
 from support.recorded_walk import needs_recorded_walk, read_recorded_walk
 
 pytestmark = needs_recorded_walk

@@ -3,10 +3,10 @@
 from contextlib import ExitStack
 import time
 
-from support.node_harness import BOTH, LOSSLESS, NodeProcess, Robot, SECOND
 import pytest
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
+from support.node_harness import BOTH, LOSSLESS, NodeProcess, Robot, SECOND
 
 
 @pytest.fixture(scope='module')

@@ -9,8 +9,8 @@ import subprocess
 import sys
 import time
 
-from support.node_harness import BOTH, DEADLINE, LOSSLESS, NodeProcess, Robot, SECOND
 import pytest
+from support.node_harness import BOTH, DEADLINE, LOSSLESS, NodeProcess, Robot, SECOND
 
 INT, TERM = signal.SIGINT, signal.SIGTERM
 QOS = 'qos_overrides./joint_states.subscription.'

@@ -3,9 +3,9 @@
 from itertools import pairwise
 import time
 
-from support.node_harness import BOTH, DEEP, LEFT, LOSSLESS, NodeProcess, Robot, SECOND
 import pytest
 from rosgraph_msgs.msg import Clock
+from support.node_harness import BOTH, DEEP, LEFT, LOSSLESS, NodeProcess, Robot, SECOND
 
 MS = 1_000_000  # ns
 HALF = SECOND // 2

@@ -12,9 +12,9 @@ from icub_leg_fk.stream.cdr import (
     TFMessageEncoder,
     TwistStampedEncoder,
 )
+import pytest
 from support.joint_model import Message
 from support.joint_trial import bits, decode_joint_state
-import pytest
 
 TEXT = st.text(max_size=30)  # every character but lone surrogates, NUL included
 DOUBLES = st.lists(st.floats(), max_size=6).map(tuple)

@@ -3,10 +3,10 @@
 from collections import Counter
 
 from icub_leg_fk.kinematics import Catalog
-from icub_leg_fk.stream.joint_input import ChainCounts, JointInput
 from icub_leg_fk.node.signs_of_life import JOINT_STATE, Second, SignsOfLife, ThrottledWarnings
-from support.joint_model import Message
+from icub_leg_fk.stream.joint_input import ChainCounts, JointInput
 import pytest
+from support.joint_model import Message
 
 LEG = Catalog.load().chain('left_leg', 'v2_5')
 KNEE = LEG.joint_names[3]

@@ -4,8 +4,8 @@ from contextlib import redirect_stdout
 from io import StringIO
 from pathlib import Path
 
-from icub_leg_fk.kinematics import Catalog
 from icub_leg_fk.__main__ import main
+from icub_leg_fk.kinematics import Catalog
 import numpy as np
 import pytest
 

@@ -103,53 +103,62 @@ class Held:
 class JointModel:
     """The rules of the input, one after the other, with no thought of speed.
 
-    `chains` is a list of {joint: (lower, upper)}; `timeout` is in ns.
+    `chains` maps the name of each chain to its joints' ranges, {joint: (lower, upper)}; `timeout`
+    is in ns. What is counted, is counted from the last `count_anew` on.
     """
 
     def __init__(self, chains, timeout):
         self.chains = chains
         self.timeout = timeout
         self.held = {}
-        self.messages = 0
-        self.counts = Counter()
-        self.ready = [0] * len(chains)
-        self.held_back = [Counter() for _ in chains]
-        self.concerned = [set() for _ in chains]  # (reason, joint)
+        self.count_anew()
 
-    def update(self, stamp, names, positions, velocities):
+    def count_anew(self):
+        self.messages = 0
+        self.rejected = Counter()
+        self.joints_by_frame_id = {}
+        self.ready = Counter()
+        self.silent = Counter()
+        self.held_back = {name: Counter() for name in self.chains}
+        self.concerned = {name: set() for name in self.chains}  # (reason, joint)
+
+    def update(self, stamp, message):
         """Return (chain, positions, velocities or None) for every chain that is ready."""
         self.messages += 1
-        if len(positions) == 0:
-            self.counts['empty_position'] += 1
-            return []
-        if len(positions) < len(names):
-            self.counts['short_position'] += 1
-            return []
+        names = message.names
+        if len(message.positions) == 0:
+            return self.reject('empty_position')
+        if len(message.positions) != len(names):
+            return self.reject('position_length')
         for name in names:
             if names.count(name) > 1:
-                self.counts['duplicate_name'] += 1
-                return []
-        brought = [name for name in names if any(name in chain for chain in self.chains)]
+                return self.reject('duplicate_name')
+        brought = [name for name in names if any(name in chain for chain in self.chains.values())]
         if not brought:
             return []
+        self.joints_by_frame_id.setdefault(message.frame_id, set()).update(brought)
         if self.has_stepped_back(stamp, brought):
-            self.counts['time_jump'] += 1
+            self.reject('time_jump')
             self.held = {}
         for i in range(len(names)):
             if names[i] in brought:
-                velocity = velocities[i] if len(velocities) >= len(names) else math.nan
-                self.held[names[i]] = Held(stamp, positions[i], velocity)
+                has_velocities = len(message.velocities) == len(names)
+                velocity = message.velocities[i] if has_velocities else math.nan
+                self.held[names[i]] = Held(stamp, message.positions[i], velocity)
         ready = []
-        for index, chain in enumerate(self.chains):
-            if any(joint in brought for joint in chain) and self.is_ready(index):
-                self.ready[index] += 1
-                for joint, (lower, upper) in chain.items():
-                    if self.held[joint].position < lower or self.held[joint].position > upper:
-                        self.concerned[index].add(('out_of_range', joint))
-                speeds = tuple(self.held[joint].velocity for joint in chain)
-                ready.append((index, tuple(self.held[joint].position for joint in chain),
-                              speeds if all(-LARGEST < v < LARGEST for v in speeds) else None))
+        for name, chain in self.chains.items():
+            if any(joint in brought for joint in chain):
+                if self.is_ready(name):
+                    positions = tuple(self.held[joint].position for joint in chain)
+                    ready.append((name, positions, self.velocities(name)))
+                    self.ready[name] += 1
+                else:
+                    self.silent[name] += 1
         return ready
+
+    def reject(self, reason):
+        self.rejected[reason] += 1
+        return []
 
     def has_stepped_back(self, stamp, brought):
         for joint in brought:
@@ -158,8 +167,8 @@ class JointModel:
         return self.timeout > 0 and any(
             held.stamp - stamp > self.timeout for held in self.held.values())
 
-    def is_ready(self, index):
-        chain = self.chains[index]
+    def is_ready(self, name):
+        chain = self.chains[name]
         newest = max(self.held[joint].stamp for joint in chain if joint in self.held)
         faults = set()
         for joint in chain:
@@ -169,17 +178,24 @@ class JointModel:
                 faults.add(('stale_joint', joint))
             elif not -LARGEST < self.held[joint].position < LARGEST:
                 faults.add(('non_finite', joint))
-        self.concerned[index] |= faults
+        self.hold_back(name, faults)
+        if faults:
+            return False
+        for joint, (lower, upper) in chain.items():
+            if self.held[joint].position < lower or self.held[joint].position > upper:
+                self.concerned[name].add(('out_of_range', joint))
+        return True
+
+    def velocities(self, name):
+        velocities = tuple(self.held[joint].velocity for joint in self.chains[name])
+        faults = set()
+        for joint, velocity in zip(self.chains[name], velocities):
+            if not -LARGEST < velocity < LARGEST:
+                faults.add(('no_velocity', joint))
+        self.hold_back(name, faults)
+        return None if faults else velocities
+
+    def hold_back(self, name, faults):
+        self.concerned[name] |= faults
         for reason in {reason for reason, _ in faults}:
-            self.held_back[index][reason] += 1
-        return not faults
-
-    @property
-    def newest(self):
-        return max((held.stamp for held in self.held.values()), default=None)
-
-    def counts_taken(self):
-        """Start counting anew what is counted per chain."""
-        self.ready = [0] * len(self.chains)
-        self.held_back = [Counter() for _ in self.chains]
-        self.concerned = [set() for _ in self.chains]
+            self.held_back[name][reason] += 1

@@ -1,7 +1,7 @@
 """Messages through the model of the rules and through the joint input, side by side."""
 
-from collections import Counter
 from dataclasses import dataclass
+from itertools import islice
 import math
 import struct
 
@@ -24,11 +24,14 @@ def bits(values):
 def decode_joint_state(data):
     """Return a serialized JointState as a message; raise MalformedMessageError if it is none."""
     layout = read_layout(data)
-    sec, nanosec = struct.unpack_from(f'{layout.byte_order}iI', data, 4)
-    positions, velocities = (
-        struct.unpack_from(f'{layout.byte_order}{n}d', data, at)
-        for at, n in (layout.positions, layout.velocities))
-    return Message(sec, nanosec, layout.names, positions, velocities)
+    order = layout.byte_order
+    sec, nanosec = struct.unpack_from(f'{order}iI', data, 4)
+    positions, velocities = layout.positions, layout.velocities
+    return Message(
+        sec, nanosec, layout.names,
+        struct.unpack_from(f'{order}{positions.n}d', data, positions.at),
+        struct.unpack_from(f'{order}{velocities.n}d', data, velocities.at),
+        frame_id=layout.frame_id, order=order)
 
 
 class Trial:
@@ -36,68 +39,69 @@ class Trial:
 
     def __init__(self, chains, timeout=SECOND // 2):
         self.now = 1_700_000_000 * SECOND
-        self.model = JointModel([
-            {joint: link.limits
-             for joint, link in zip(chain.joint_names, chain.joints, strict=True)}
-            for chain in chains], timeout)
-        self.reported = Counter()
-        self.input = JointInput(chains, timeout / SECOND, lambda: self.now, self._report,
-                                velocities=True)
+        self.chains = chains
+        ranges = {}
+        for chain in chains:
+            limits = [link.limits for link in chain.joints]
+            ranges[chain.name] = dict(zip(chain.joint_names, limits, strict=True))
+        self.model = JointModel(ranges, timeout)
+        self.input = JointInput(lambda: self.now)
+        self.input.configure(chains, timeout / SECOND, velocities=True)
+        self.messages = 0
 
-    def _report(self, reason, text):
-        self.reported[reason] += 1
-
-    def send(self, message):
-        """Send a message and return the chains it made ready."""
+    def send(self, message, data=None):
+        """Send a message, in other bytes than its own if given; return how many chains it gives."""
+        self.messages += 1
         sec, nanosec = message.sec, message.nanosec
         if sec == 0 and nanosec == 0:
             sec, nanosec = divmod(self.now, SECOND)
-        ready = self.model.update(sec * SECOND + nanosec, message.names, message.positions,
-                                  message.velocities)
-        expected = [(chain, sec, nanosec, bits(q), bits(qdot)) for chain, q, qdot in ready]
-        assert [(chain, sec, nanosec, bits(q), bits(qdot))
-                for chain, sec, nanosec, q, qdot in self.input.feed(message.cdr())
-                ] == expected, message
-        return [chain for chain, _, _ in ready]
+        expected = []
+        for chain, q, qdot in self.model.update(sec * SECOND + nanosec, message):
+            expected.append((chain, sec, nanosec, bits(q), bits(qdot)))
+        vectors = self.input.feed(message.cdr() if data is None else data)
+        found = []
+        for vector in vectors:
+            assert vector.chain in self.chains
+            assert vector.stamp == sec * SECOND + nanosec
+            found.append((vector.chain.name, vector.sec, vector.nanosec, bits(vector.positions),
+                          bits(vector.velocities)))
+        assert found == expected, message
+        return len(found)
 
     def send_bytes(self, data):
-        """Send bytes that may be anything, and return the chains they made ready."""
+        """Send bytes that may be anything, and return how many chains they give."""
         try:
             message = decode_joint_state(data)
         except MalformedMessageError:
+            self.messages += 1
             self.model.messages += 1
-            self.model.counts['malformed'] += 1
+            self.model.reject('malformed')
             assert self.input.feed(data) == []
-            return []
-        stamp = message.sec * SECOND + message.nanosec
-        if message.sec == 0 and message.nanosec == 0:
-            stamp = self.now
-        ready = self.model.update(stamp, message.names, message.positions, message.velocities)
-        assert [(chain, sec * SECOND + nanosec, bits(q), bits(qdot))
-                for chain, sec, nanosec, q, qdot in self.input.feed(data)] == [
-                    (chain, stamp, bits(q), bits(qdot)) for chain, q, qdot in ready], data
-        return [chain for chain, _, _ in ready]
+            return 0
+        return self.send(message, data)
 
     def check_state(self):
-        """Compare all that is held and counted, then start counting anew."""
-        model = self.model
-        for index, chain in enumerate(model.chains):
-            counts = self.input.take_counts(index)
-            assert counts.ready == model.ready[index]
-            assert counts.held_back == model.held_back[index]
-            assert {(reason, joint) for reason, joints in counts.joints.items()
-                    for joint in joints
-                    if reason != 'looks_like_degrees'} == model.concerned[index]
-            assert self.input.known_joints(index) == {
-                joint: model.held[joint].stamp for joint in chain if joint in model.held}
-        assert (self.input.messages, self.input.newest) == (model.messages, model.newest)
-        assert self.input.counts == model.counts
-        expected = sum(model.held_back, Counter()) + model.counts
-        del expected['empty_position']
-        assert self.reported == expected
-        model.counts_taken()
-        self.reported = +Counter({reason: n for reason, n in model.counts.items()
-                                  if reason != 'empty_position'})
+        """Compare all that is held, counted and noted, then start counting anew."""
+        model, look = self.model, self.input.take_look()
+        assert self.input.messages == self.messages
+        assert look.messages == model.messages
+        assert look.rejected == model.rejected
+        assert look.faults.keys() == model.rejected.keys()
+        assert look.frame_ids == dict(islice(model.joints_by_frame_id.items(), 8))
+        for chain in self.chains:
+            name = chain.name
+            of_chain = look.chains[name]
+            assert of_chain.chain is chain
+            assert (of_chain.ready, of_chain.silent) == (model.ready[name], model.silent[name])
+            assert of_chain.held_back == model.held_back[name]
+            concerned = set()
+            for reason in of_chain.joints.keys() - {'looks_like_degrees'}:
+                concerned |= {(reason, joint) for joint in of_chain.joints[reason]}
+            assert concerned == model.concerned[name]
+            assert self.input.held_stamps(chain) == {
+                joint: model.held[joint].stamp for joint in model.chains[name]
+                if joint in model.held}
+        model.count_anew()
 
 
 @dataclass(frozen=True)
@@ -133,28 +137,39 @@ FAULTS = ('position', 'velocity', 'cut', 'drop', 'repeat', 'reverse', 'swap', 's
 def publishers(chains):
     """Return a strategy: publishers as on robots, of bridges for parts, and strangers."""
     own = [chain.joint_names for chain in chains]
-    joints = list(dict.fromkeys(name for names in own for name in names))
+    joints = list(dict.fromkeys(chain_joint for names in own for chain_joint in names))
     strangers = ['', 'wheel', 'läuft', joints[0].upper(), joints[0] + ' ']
     names = st.one_of(
         st.sampled_from([tuple(joints), *own, ('wheel', *joints, '')]),
         st.permutations(joints).map(tuple),
         st.lists(st.sampled_from(joints + strangers), unique=True).map(tuple))
-    per_name = st.sampled_from((0, 1, 1, 1.5, 0.5))
-    return st.lists(st.builds(
-        Publisher, names, st.sampled_from((0, 0, 0, 1, 4)), per_name, per_name,
-        st.sampled_from(('', 'base_link')), st.sampled_from('<<<>'), st.sampled_from((0, 0, 4, 9)),
-    ), min_size=1, max_size=12)
+    publisher = st.builds(
+        Publisher,
+        names=names,
+        surplus=st.sampled_from((0, 0, 0, 0, 0, 0, 1, 4)),
+        velocities=st.sampled_from((0, 1, 1, 1.5, 0.5)),
+        efforts=st.sampled_from((0, 1, 1, 1.5, 0.5)),
+        frame_id=st.sampled_from(('', 'base_link')),
+        order=st.sampled_from('<<<>'),
+        extra=st.sampled_from((0, 0, 4, 9)))
+    return st.lists(publisher, min_size=1, max_size=12)
 
 
 def steps(faults):
     """Return a strategy: a sequence of messages of which this share, 0 to 1, has a fault."""
-    sound = [None] * round(len(FAULTS) * (1 / faults - 1)) if faults else [None]
-    return st.lists(st.builds(
-        Step, st.integers(0, 11), st.sampled_from((1, 10**6, 10**7, 10**7, SECOND // 2)),
-        st.sampled_from((*sound, *(FAULTS if faults else ()))), st.integers(0, 40),
-        st.sampled_from(SPECIAL),
-        st.sampled_from((0, 1, 10**6, SECOND // 2, SECOND // 2 + 1, 3 * SECOND, 10**19)),
-        st.sampled_from((0, 0, 255))), max_size=60)
+    choices = [None]
+    if faults:
+        choices = [None] * round(len(FAULTS) * (1 / faults - 1)) + list(FAULTS)
+    step = st.builds(
+        Step,
+        publisher=st.integers(0, 11),
+        elapsed=st.sampled_from((1, 10**6, 10**7, 10**7, SECOND // 2)),
+        fault=st.sampled_from(choices),
+        at=st.integers(0, 40),
+        value=st.sampled_from(SPECIAL),
+        shift=st.sampled_from((0, 1, 10**6, SECOND // 2, SECOND // 2 + 1, 3 * SECOND, 10**19)),
+        padding=st.sampled_from((0, 0, 255)))
+    return st.lists(step, max_size=60)
 
 
 STARTS = st.sampled_from((0, 7, 1_700_000_000, -3, 2**31 - 20))  # s
@@ -162,47 +177,59 @@ STARTS = st.sampled_from((0, 7, 1_700_000_000, -3, 2**31 - 20))  # s
 
 def traffic(publishers, steps, start):
     """Yield the messages of some publishers who take turns."""
-    time, last = start * SECOND, {}
+    time = start * SECOND
+    last = {}
     for number, step in enumerate(steps):
         publisher = publishers[step.publisher % len(publishers)]
-        n = len(publisher.names)
-        names = list(publisher.names)
-        # Numbers that differ from message to message and from joint to joint, within 0.4.
-        positions, velocities, efforts = (
-            [((31 * number + 17 * i) % 81 - 40) / 100 for i in range(int(size))]
-            for size in (n + publisher.surplus, n * publisher.velocities, n * publisher.efforts))
-        at = step.at % n if n else 0
         time += step.elapsed
         if step.fault == 'back':
             time = max(time - step.shift, -2 * SECOND)
-        stamp, carry = time, 0
-        if step.fault == 'position' and n:
-            positions[at] = step.value
-        elif step.fault == 'velocity' and velocities:
-            velocities[at % len(velocities)] = step.value
-        elif step.fault == 'cut':
-            del positions[at:]
-        elif step.fault == 'drop':
-            del names[at:at + 1]
-        elif step.fault == 'repeat' and n:
-            names[-1] = names[at]
-        elif step.fault == 'reverse':
-            names.reverse()
-        elif step.fault == 'swap':
-            velocities, efforts = efforts, velocities
-        elif step.fault == 'stranger':
-            names.insert(at, 'stranger')
-        elif step.fault == 'late':
+        stamp = time
+        if step.fault == 'late':
             stamp -= step.shift
         elif step.fault == 'zero stamp':
             stamp = 0
         elif step.fault == 'again':
             stamp = last.get(publisher, stamp)
-        elif step.fault == 'no carry':  # some publishers do not; it is the same time
-            carry = 1 + step.at % 3
         last[publisher] = stamp
+        carry = 1 + step.at % 3 if step.fault == 'no carry' else 0  # some publishers do not
         sec, nanosec = divmod(stamp, SECOND)
         sec = min(max(sec, carry - 2**31), 2**31 - 1)
-        yield Message(sec - carry, nanosec + carry * SECOND, tuple(names), tuple(positions),
-                      tuple(velocities), tuple(efforts), publisher.frame_id, publisher.order,
-                      publisher.extra, step.padding)
+        names, positions, velocities, efforts = contents(publisher, number, step)
+        yield Message(
+            sec - carry, nanosec + carry * SECOND, tuple(names), tuple(positions),
+            tuple(velocities), tuple(efforts), publisher.frame_id, publisher.order,
+            publisher.extra, step.padding)
+
+
+def contents(publisher, number, step):
+    """Return the lists of a message, with the fault that a step has."""
+    names = list(publisher.names)
+    n = len(names)
+    positions = values(number, n + publisher.surplus)
+    velocities = values(number, int(n * publisher.velocities))
+    efforts = values(number, int(n * publisher.efforts))
+    at = step.at % n if n else 0
+    if step.fault == 'position' and n:
+        positions[at] = step.value
+    elif step.fault == 'velocity' and velocities:
+        velocities[at % len(velocities)] = step.value
+    elif step.fault == 'cut':
+        del positions[at:]
+    elif step.fault == 'drop':
+        del names[at:at + 1]
+    elif step.fault == 'repeat' and n:
+        names[-1] = names[at]
+    elif step.fault == 'reverse':
+        names.reverse()
+    elif step.fault == 'swap':
+        velocities, efforts = efforts, velocities
+    elif step.fault == 'stranger':
+        names.insert(at, 'stranger')
+        positions.insert(at, 0.0)
+    return names, positions, velocities, efforts
+
+
+def values(number, n):
+    """Return n numbers that differ from message to message and from joint to joint, within 0.4."""
+    return [((31 * number + 17 * i) % 81 - 40) / 100 for i in range(n)]

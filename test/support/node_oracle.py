@@ -3,8 +3,8 @@
 from functools import cache
 
 import numpy as np
-from support.oracle import HandMadeArm, PinocchioArm
 import pytest
+from support.oracle import HandMadeArm, PinocchioArm
 
 
 @cache
