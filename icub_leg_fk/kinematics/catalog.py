@@ -130,7 +130,8 @@ class Catalog(Frozen):
         Raises:
             UnknownNameError: no such chain or version; lists the known ones.
             VersionNeededError: a chain has several versions and no default.
-            LegFKError: no chain, a chain twice, or chains whose roots share a name but not axes.
+            LegFKError: no chain, a chain twice, chains whose roots share a name but not axes, or
+                chains whose tips would have one topic.
         """
         chains: dict[str, Chain] = {}
         for name in names:
@@ -140,7 +141,8 @@ class Catalog(Frozen):
             chains[chain.name] = chain
         if not chains:
             raise LegFKError(f'no chain is named; allowed: one or more of {listed(self.chains)}')
-        _refuse_conflicting_roots(list(chains.values()))
+        _refuse_conflicting_roots(chains.values())
+        _refuse_shared_tips(chains.values())
         return tuple(chains.values())
 
     def split(self, name: str) -> tuple[str, str]:
@@ -205,6 +207,16 @@ def config_file(name: str) -> Path:
             return place / name
     raise CatalogError(name, 0, 'shipped configuration', 'nothing',
                        'one of ' + ', '.join(map(str, places)))
+
+
+def _refuse_shared_tips(chains: Iterable[Chain]) -> None:
+    """Refuse chains whose tips would have one topic, as links `a b` and `a_b` of a URDF."""
+    first_of: dict[str, Chain] = {}
+    for chain in chains:
+        first = first_of.setdefault(chain.tip, chain)
+        if first is not chain:
+            raise LegFKError(f'chains {first.name} and {chain.name} do not go together: the name '
+                             f'of their tips in topics is {chain.tip}')
 
 
 def _holds_xml(path: str | Path) -> bool:

@@ -147,7 +147,7 @@ def _frames_and_rows(axes: Sequence[_Axis], T_end: Array, tolerance: float
     links: list[DHLink] = []
     for axis, following in zip(axes, [*axes[1:], None], strict=True):
         if following is None:
-            placed = [_last_frame(frames[-1], T_end)]
+            placed = [_last_frame(frames[-1], T_end, tolerance)]
         else:
             placed = _frames_on(frames[-1], axis, following, tolerance)
         for frame in placed:
@@ -173,11 +173,12 @@ def _frames_on(frame: Array, axis: _Axis, following: _Axis, tolerance: float) ->
     return [first, _next_frame(first, z, foot, 0.0)]
 
 
-def _last_frame(frame: Array, T_end: Array) -> Array:
+def _last_frame(frame: Array, T_end: Array, tolerance: float) -> Array:
     """Return the last row's frame: in the tip if it can stand there, else wherever is near."""
     z, point = T_end[:3, 2], T_end[:3, 3]
-    if float(np.linalg.norm(np.cross(frame[:3, 2], z))) < _EXACT:
-        last = _next_frame(frame, z, point, _EXACT)
+    apart = max(tolerance, _EXACT)
+    if float(np.linalg.norm(np.cross(frame[:3, 2], z))) <= apart:
+        last = _next_frame(frame, z, point, apart)
         last[:3, 3] = point
         return last
     reach = _FAR + 5 * float(np.linalg.norm(point - frame[:3, 3]))

@@ -11,7 +11,7 @@ import re
 import sys
 from typing import NamedTuple, NoReturn
 
-from icub_leg_fk.errors import closest, InputFileError, UnknownNameError
+from icub_leg_fk.errors import CatalogError, closest, InputFileError, UnknownNameError
 from icub_leg_fk.kinematics.rotation import Array, quaternion_to_matrix, turns_about
 from icub_leg_fk.kinematics.urdf_xml import REPLACEMENT, robot_element, tag
 from lxml import etree
@@ -111,7 +111,7 @@ class Urdf:
             InputFileError: it cannot be read or is not a URDF; says why.
         """
         file = str(path) if str(path).isprintable() else repr(str(path))
-        return cls.parse(_read(file, path), file)
+        return cls.parse(_bytes(file, path), file)
 
     @classmethod
     def parse(cls, data: bytes, file: str) -> Urdf:
@@ -169,7 +169,7 @@ class Urdf:
         Raises:
             UnknownNameError: lists the links at the ends.
         """
-        if link in self.links:
+        if link in self._links:
             return
         ends = self.ends()[:_MOST_ENDS]
         guess = closest(link, self.links)
@@ -229,6 +229,10 @@ class Urdf:
         return T
 
     @cached_property
+    def _links(self) -> frozenset[str]:
+        return frozenset(self.links)
+
+    @cached_property
     def _joints_by_name(self) -> dict[str, JointElement]:
         return {joint.name: joint for joint in self.joints}
 
@@ -257,12 +261,21 @@ class Urdf:
         return way
 
     def _checked(self, joint: JointElement) -> UrdfJoint:
-        """Return a joint of the way with its numbers read."""
+        """Return a joint of the way with its numbers read, once."""
+        if joint.name not in self._read_joints:
+            self._read_joints[joint.name] = self._read(joint)
+        return self._read_joints[joint.name]
+
+    @cached_property
+    def _read_joints(self) -> dict[str, UrdfJoint]:
+        return {}
+
+    def _read(self, joint: JointElement) -> UrdfJoint:
         if joint.kind not in (*MOVING, 'fixed'):
             self._fail(f'joint {joint.name!r} is {joint.kind or "of no type"}; allowed: revolute, '
                        'continuous, prismatic, fixed')
         for link in (joint.parent, joint.child):
-            if link not in self.links:
+            if link not in self._links:
                 self._fail(f'joint {joint.name!r} names the link {link!r}, which is not there')
         for name in (joint.name, joint.parent, joint.child):
             if REPLACEMENT in name:
@@ -359,13 +372,13 @@ class Urdf:
         raise InputFileError(self.file, fault)
 
 
-def _read(file: str, path: str | Path) -> bytes:
+def _bytes(file: str, path: str | Path) -> bytes:
     try:
         with open(path, 'rb') as stream:
             data = stream.read(_LARGEST_FILE + 1)
     except (OSError, ValueError) as error:  # a ValueError for a zero byte in the path
         reason = getattr(error, 'strerror', None) or str(error)
-        raise InputFileError(file, f'cannot be read: {reason.lower()}') from None
+        raise CatalogError(file, 0, '', reason.lower(), 'a readable URDF') from None
     if len(data) > _LARGEST_FILE:
         raise InputFileError(file, f'has more than {_LARGEST_FILE} bytes; a URDF is smaller')
     return data
