@@ -201,11 +201,17 @@ def _summary(row: Comparison, rows: Sequence[Comparison]) -> str:
             words += ', and it is another mechanism'
         elif fitted and fitted.mm <= 0.2 * direct.mm:
             words += f', most of it a shift of its ends ({_short(fitted.mm)} mm fitted)'
+    return f'{chain.name}: {words}{_other_axes(row, rows)}'
+
+
+def _other_axes(row: Comparison, rows: Sequence[Comparison]) -> str:
+    """Return which frames of a version have other axes than the robot's of their name."""
+    words = ''
     for other in rows:
-        is_same = (other.chain.name, other.chain.version) == (chain.name, chain.version)
+        is_same = (other.chain.name, other.chain.version) == (row.chain.name, row.chain.version)
         if is_same and other.turn:
             words += f'; its {other.chain.frame_id} has other axes, turned by {other.turn}'
-    return f'{chain.name}: {words}'
+    return words
 
 
 def _is_near(found: Difference) -> bool:

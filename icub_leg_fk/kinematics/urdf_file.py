@@ -44,6 +44,9 @@ class JointElement(NamedTuple):
     child: str
     texts: Mapping[tuple[str, str], str]
 
+    def __repr__(self) -> str:
+        return f'<JointElement {self.name[:40]}: {self.kind[:20]}>'
+
 
 class UrdfJoint(NamedTuple):
     """A joint on the way from a root to a tip.
@@ -86,8 +89,11 @@ class UrdfJoint(NamedTuple):
             T[:, :3, :3] = turns_about(self.axis, position)
         return T
 
+    def __repr__(self) -> str:
+        return f'<UrdfJoint {self.name[:40]}: {self.kind}>'
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Urdf:
     """The kinematics of a URDF.
 
@@ -370,6 +376,9 @@ class Urdf:
 
     def _fail(self, fault: str) -> NoReturn:
         raise InputFileError(self.file, fault)
+
+    def __repr__(self) -> str:
+        return f'<Urdf {self.name[:40]}: {len(self.links)} links, {len(self.joints)} joints>'
 
 
 def _bytes(file: str, path: str | Path) -> bytes:

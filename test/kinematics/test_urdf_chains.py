@@ -44,7 +44,7 @@ def test_every_link_below_the_root_with_a_joint_between_is_a_chain(arm: Path) ->
 def test_chains_whose_topics_would_have_one_name_are_not_used_together(tmp_path: Path) -> None:
     file = tmp_path / 'arm.urdf'
     file.write_text(ARM.replace('"l2"', '"the_tool__x_"'))
-    with pytest.raises(LegFKError, match=r'chains the tool \[x\] and the_tool__x_ do not go toget'):
+    with pytest.raises(LegFKError, match=r'chains the tool \[x\] and the_tool__x_ do not go'):
         Catalog.load(file).select(['the tool [x]', 'the_tool__x_'])
 
 

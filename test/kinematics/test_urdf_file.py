@@ -264,6 +264,12 @@ def test_rows_follow_what_a_joint_mimics_even_by_another() -> None:
             0.3 - 0.5 * q4 + 0.7])
 
 
+def test_every_repr_fits_a_line() -> None:
+    urdf = load(robot([joint(0)]).replace('j0', 'j' * 200))
+    for thing in (urdf, urdf.joints[0], urdf.path('l0', 'l1')[0]):
+        assert len(repr(thing)) < 99
+
+
 def test_a_joint_may_follow_one_that_only_messages_have() -> None:
     """As robot_state_publisher moves it."""
     chain = chain_from_urdf(load(robot([joint(0, more='<mimic joint="elsewhere"/>'), joint(1)])),
