@@ -12,7 +12,14 @@ README = Path(__file__).with_name('README.md')
 
 ROS, KILTED = ([f'ros-{release}-{name}' for name in (
     'common-interfaces', 'rclpy', 'rmw-fastrtps-cpp')] for release in ('jazzy', 'kilted'))
-TOOLS = ['argcomplete', 'matplotlib>=3.6', 'rich', 'rosbags>=0.11.9,<0.12', 'sympy']
+TOOLS = [
+    'argcomplete',
+    'matplotlib>=3.6',
+    'rich',
+    'rosbags>=0.11.9,<0.12',
+    'sympy',
+    'viser>=1.1',
+]
 TEST = [
     'colcon-common-extensions',
     'distributed',
@@ -21,6 +28,7 @@ TEST = [
     'icub-models',
     'mcap',
     'pin',
+    'playwright',
     'pytest>=7.4',
     'pytest-xdist',
     'roboticstoolbox-python',

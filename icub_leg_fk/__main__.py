@@ -24,6 +24,7 @@ COMMANDS = {  # and what they are for
     'explain': 'explain a chain: DH table, each A_i, products, answer',
     'bag': 'copy a bag and add the poses of the feet, as the node sends them',
     'plot': 'a picture of the feet over time and the legs in space, from a bag or CSV',
+    'view': 'a page in the browser: sliders, poses, the DH method step by step',
     'table': 'make the DH table of any robot from its URDF, as a kinematics file',
     'compare': 'compare a robot, given by its URDF, with the versions of the tables',
     'urdf': 'write chains as a URDF, for RViz, Pinocchio and others',

@@ -1,22 +1,23 @@
 """The node: subscribes to joint states and publishes the poses of the feet."""
 
-import time
-
-from icub_leg_fk.node.diagnostics import Diagnostics
+from icub_leg_fk.node.health import Health
 from icub_leg_fk.node.outputs import Outputs
 from icub_leg_fk.node.parameters import NodeParameters
 from icub_leg_fk.node.qos_overrides import OVERRIDABLE
-from icub_leg_fk.node.signs_of_life import SignsOfLife, ThrottledWarnings
 from icub_leg_fk.stream.configuration import Configuration
 from icub_leg_fk.stream.joint_input import JointInput
+from icub_leg_fk.stream.notes import INFO, Note, WARNING
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.node import Node
-from rclpy.qos import qos_profile_sensor_data
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 NODE_NAME = 'foot_pose_publisher'
 START_ERRORS = (ParameterException, NameValidationException, RuntimeError)
 """What rclpy raises for values given at start that it cannot use itself."""
+
+_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""SensorDataQoS, but deep enough for a pause of 15 ms at 1 kHz."""
 
 
 class FootPosePublisher(Node):
@@ -28,48 +29,54 @@ class FootPosePublisher(Node):
 
     def __init__(self) -> None:
         super().__init__(NODE_NAME)
-        parameters = NodeParameters(self, self._configure)
-        topic = self.resolve_topic_name('joint_states')
-        self._signs = SignsOfLife(self.get_logger(), topic)
-        self._warnings = ThrottledWarnings(lambda text: self.get_logger().warning(text))
-        self._input = JointInput((), 0.0, lambda: 0)
-        self._heard: float | None = None
-        self._outputs = Outputs(self, lambda chain: self._input.note_no_velocity(chain))
+        parameters = NodeParameters(self, self._apply)
+        self._input = JointInput(lambda: self.get_clock().now().nanoseconds)
+        self._outputs = Outputs(self)
         self._joint_states = self.create_subscription(
-            JointState, 'joint_states', self._take, qos_profile_sensor_data, raw=True,
+            JointState, 'joint_states', self._take, _QOS, raw=True,
             qos_overriding_options=OVERRIDABLE)
-        self._configure(parameters.configuration)
-        self._diagnostics = Diagnostics(self, topic, self._signs,
-                                        lambda: (self._input, self._heard))
+        self._health = Health(self, self._input, self._joint_states.topic_name)
+        self._apply(parameters.configuration)
+        self._health.say_announcement()
+
+    def _apply(self, configuration: Configuration) -> None:
+        """Begin to work as configured, with the joints that are already known."""
+        self._input.configure(configuration.chains, configuration.joint_timeout,
+                              configuration.publish_twist)
+        self._outputs.configure(configuration)
+        self._health.announce(_announcement(configuration, self._joint_states.topic_name))
 
     def _take(self, data: bytes) -> None:
         """Take one serialized JointState in and publish what it makes ready."""
-        self._heard = time.monotonic()
-        if vectors := self._input.feed(data):
+        vectors = self._input.feed(data)
+        if vectors:
             self._outputs.publish(vectors)
 
-    def _configure(self, configuration: Configuration) -> None:
-        """Begin to work as configured, with the joints that are already known."""
-        joint_input = JointInput(configuration.chains, configuration.joint_timeout,
-                                 lambda: self.get_clock().now().nanoseconds, self._warnings,
-                                 configuration.publish_twist)
-        joint_input.take_over(self._input)
-        self._input = joint_input
-        self._outputs.configure(configuration)
-        self._signs.configured([
-            *configuration.notes,
-            f'publishing {_published(configuration)}; joint states from '
-            f'{self._joint_states.topic_name}'], configuration.warnings)
+
+def _announcement(configuration: Configuration, topic: str) -> list[Note]:
+    """Return what there is to say of a configuration."""
+    notes = [Note('kinematics', '', WARNING, text) for text in configuration.warnings]
+    texts = [*configuration.notes, f'publishing {_kinds(configuration)} of '
+             f'{_chains(configuration)}; joint states from {topic}']
+    return notes + [Note('configuration', '', INFO, text) for text in texts]
 
 
-def _published(configuration: Configuration) -> str:
-    """Say what is published in a line."""
+def _kinds(configuration: Configuration) -> str:
+    kinds = ['poses']
+    if configuration.publish_twist:
+        kinds.append('twists')
+    if configuration.publish_tf:
+        kinds.append('transforms')
+    if configuration.publish_markers:
+        kinds.append('skeletons')
+    *first, last = kinds
+    return f'{", ".join(first)} and {last}' if first else last
+
+
+def _chains(configuration: Configuration) -> str:
     prefix = configuration.frame_prefix
-    kinds = ['poses', *(kind for kind, wanted in (
-        ('twists', configuration.publish_twist), ('transforms', configuration.publish_tf),
-        ('skeletons', configuration.publish_markers)) if wanted)]
-    chains = ', '.join(
-        f'{chain.tip} ({chain.name} {chain.version}, {prefix}{chain.root_frame} to '
-        f'{prefix}{chain.frame_id})' for chain in configuration.chains)
-    kinds[-2:] = [' and '.join(kinds[-2:])]
-    return f'{", ".join(kinds)} of {chains}'
+    words = []
+    for chain in configuration.chains:
+        frames = f'{prefix}{chain.root_frame} to {prefix}{chain.frame_id}'
+        words.append(f'{chain.tip} ({chain.name}={chain.version}, {frames})')
+    return ', '.join(words)

@@ -41,10 +41,11 @@ class JointStateReader:
         """
         for form in self._forms:
             if form.fits(data):
-                break
-        else:
-            form = self._form_but_for_padding(data) or Form(data, read_layout(data), self._chains)
-        self._remember(form)
+                if form is not self._forms[0]:
+                    self._put_first(form)
+                return form
+        form = self._form_but_for_padding(data) or Form(data, read_layout(data), self._chains)
+        self._put_first(form)
         return form
 
     def _form_but_for_padding(self, data: bytes) -> Form | None:
@@ -53,16 +54,13 @@ class JointStateReader:
                 return form
         return None
 
-    def _remember(self, form: Form) -> None:
-        """Put a form first among those that are tried."""
-        forms = self._forms
-        if forms and form is forms[0]:
-            return
-        if form in forms:
-            forms.remove(form)
+    def _put_first(self, form: Form) -> None:
+        """Let a form be the first that is tried, and forget what came long ago."""
+        if form in self._forms:
+            self._forms.remove(form)
         if form.names_end <= _LARGEST_REMEMBERED:
-            forms.insert(0, form)
-            del forms[_REMEMBERED:]
+            self._forms.insert(0, form)
+            del self._forms[_REMEMBERED:]
 
 
 class Form:
@@ -97,38 +95,6 @@ class Form:
         self._remember_head(data, layout)
         self._remember_numbers(layout, list(indices.values()))
 
-    def fits(self, data: bytes) -> bool:
-        """Return whether a message has this form, and padding as the last one had."""
-        return data.startswith(self._head, STAMP_END) and self._has_lengths_of(data)
-
-    def fits_but_for_padding(self, data: bytes) -> bool:
-        """Return whether a message has this form, whatever its padding holds.
-
-        Fast CDR leaves in it what was in its buffer before.
-        """
-        head = data[STAMP_END:self.names_end]
-        if int.from_bytes(head, 'little') & self._mask != self._masked_head:
-            return False
-        if not self._has_lengths_of(data):
-            return False
-        self._head = head  # the next message of this publisher likely has the same
-        return True
-
-    def _has_lengths_of(self, data: bytes) -> bool:
-        if len(data) < self._size or data[:2] != self._encapsulation:
-            return False
-        return self._read_counts(data, self.names_end) == self._counts
-
-    def velocities(self, data: bytes) -> tuple[float, ...] | None:
-        """Return the velocities [rad/s or m/s] of the joints in `places`; None if it has none."""
-        if self._velocities_at is None:
-            return None
-        return self._numbers(data, self._velocities_at)
-
-    def positions(self, data: bytes) -> tuple[float, ...]:
-        """Return the positions [rad or m] of the joints in `places`."""
-        return self._numbers(data, self._positions_at)
-
     def _remember_head(self, data: bytes, layout: JointStateLayout) -> None:
         """Remember what a message begins with, its padding masked."""
         mask = bytearray(b'\xff' * layout.names_end)
@@ -156,6 +122,36 @@ class Form:
         self._positions_at = layout.positions.at
         has_velocities = layout.velocities.n == len(layout.names)
         self._velocities_at = layout.velocities.at if has_velocities else None
+
+    def fits(self, data: bytes) -> bool:
+        """Return whether a message has this form, and padding as the last one had."""
+        return (
+            data.startswith(self._head, STAMP_END)
+            and len(data) >= self._size
+            and data[:2] == self._encapsulation
+            and self._read_counts(data, self.names_end) == self._counts)
+
+    def fits_but_for_padding(self, data: bytes) -> bool:
+        """Return whether a message has this form, whatever its padding holds.
+
+        Fast CDR leaves in it what was in its buffer before; the next message of the same publisher
+        likely has the same.
+        """
+        head = data[STAMP_END:self.names_end]
+        if int.from_bytes(head, 'little') & self._mask != self._masked_head:
+            return False
+        self._head = head
+        return self.fits(data)
+
+    def velocities(self, data: bytes) -> tuple[float, ...] | None:
+        """Return the velocities [rad/s or m/s] of the joints in `places`; None if it has none."""
+        if self._velocities_at is None:
+            return None
+        return self._numbers(data, self._velocities_at)
+
+    def positions(self, data: bytes) -> tuple[float, ...]:
+        """Return the positions [rad or m] of the joints in `places`."""
+        return self._numbers(data, self._positions_at)
 
 
 def _fault(layout: JointStateLayout) -> tuple[str, str] | None:

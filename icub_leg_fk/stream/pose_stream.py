@@ -3,7 +3,7 @@
 The node sends them to its topics, and `leg_fk bag` writes them into a recording.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from icub_leg_fk.kinematics import Chain
@@ -25,51 +25,61 @@ class PoseStream:
     """Computes, serializes and sends what joint vectors become.
 
     Args:
-        chains: the chains, by whose index a vector names its own.
+        chains: the chains.
         frame_prefix: put before every frame id.
-        senders: of each chain.
+        senders: of each chain, by its name.
         send_tf: what takes one TFMessage per message of joint states; None if nobody listens.
-        no_velocity: called with a chain's index when a twist could not be computed.
     """
 
-    def __init__(self, chains: Sequence[Chain], frame_prefix: str, senders: Sequence[Senders],
-                 send_tf: Send | None, no_velocity: Callable[[int], None]) -> None:
-        self._frames = [(frame_prefix + chain.root_frame, frame_prefix + chain.frame_id)
-                        for chain in chains]
-        self._outputs = [
-            (chain, *send, PoseStampedEncoder(root).encode, TwistStampedEncoder(root).encode)
-            if any(send) or send_tf else None
-            for chain, send, (root, _) in zip(chains, senders, self._frames, strict=True)]
+    def __init__(self, chains: Sequence[Chain], frame_prefix: str,
+                 senders: Mapping[str, Senders], send_tf: Send | None) -> None:
         self._send_tf = send_tf
-        self._no_velocity = no_velocity
-        self._tf_encoders: dict[tuple[int, ...], TFMessageEncoder] = {}
+        self._outputs: dict[str, _Output] = {}
+        self._frames: dict[str, tuple[str, str]] = {}
+        for chain in chains:
+            root = frame_prefix + chain.root_frame
+            self._frames[chain.name] = root, frame_prefix + chain.frame_id
+            self._outputs[chain.name] = _Output(chain, root, senders[chain.name],
+                                                is_in_tf=send_tf is not None)
+        self._tf_encoders: dict[tuple[str, ...], TFMessageEncoder] = {}
 
     def send(self, vectors: Iterable[Ready]) -> None:
         """Send what one message has made ready."""
-        send_tf = self._send_tf
-        tf_chains: list[int] = []
-        tf_poses: list[Pose] = []
-        for index, sec, nanosec, q, qdot in vectors:
-            output = self._outputs[index]
-            if output is None:
-                continue
-            chain, send_pose, send_twist, encode_pose, encode_twist = output
-            if send_pose is not None or send_tf is not None:
-                pose = chain.pose(q)
-                if send_pose is not None:
-                    send_pose(encode_pose(sec, nanosec, pose))
-                tf_chains.append(index)
-                tf_poses.append(pose)
-            if send_twist is not None:
-                if qdot is None:
-                    self._no_velocity(index)
-                else:
-                    send_twist(encode_twist(sec, nanosec, chain.twist(q, qdot)))
-        if send_tf is not None and tf_chains:
-            send_tf(self._tf_encoder(tuple(tf_chains)).encode(sec, nanosec, tf_poses))
+        poses: dict[str, Pose] = {}
+        for vector in vectors:
+            pose = self._outputs[vector.chain.name].send(vector)
+            if pose is not None:
+                poses[vector.chain.name] = pose
+        if self._send_tf is not None and poses:
+            encoder = self._tf_encoder(tuple(poses))
+            self._send_tf(encoder.encode(vector.sec, vector.nanosec, [*poses.values()]))
 
-    def _tf_encoder(self, chains: tuple[int, ...]) -> TFMessageEncoder:
+    def _tf_encoder(self, chains: tuple[str, ...]) -> TFMessageEncoder:
         """Return what encodes the transforms of some chains into one message."""
         if chains not in self._tf_encoders:
-            self._tf_encoders[chains] = TFMessageEncoder([self._frames[i] for i in chains])
+            frames = [self._frames[name] for name in chains]
+            self._tf_encoders[chains] = TFMessageEncoder(frames)
         return self._tf_encoders[chains]
+
+
+class _Output:
+    """What becomes of one chain's joint vectors."""
+
+    def __init__(self, chain: Chain, root_frame: str, senders: Senders, is_in_tf: bool) -> None:
+        self._chain = chain
+        self._send_pose, self._send_twist = senders
+        self._needs_pose = is_in_tf or self._send_pose is not None
+        self._encode_pose = PoseStampedEncoder(root_frame).encode
+        self._encode_twist = TwistStampedEncoder(root_frame).encode
+
+    def send(self, vector: Ready) -> Pose | None:
+        """Send what a joint vector gives; return its pose, or None if nobody needs it."""
+        pose = None
+        if self._needs_pose:
+            pose = self._chain.pose(vector.positions)
+            if self._send_pose is not None:
+                self._send_pose(self._encode_pose(vector.sec, vector.nanosec, pose))
+        if self._send_twist is not None and vector.velocities is not None:
+            twist = self._chain.twist(vector.positions, vector.velocities)
+            self._send_twist(self._encode_twist(vector.sec, vector.nanosec, twist))
+        return pose

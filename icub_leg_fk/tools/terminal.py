@@ -14,6 +14,7 @@ def import_rich(purpose: str) -> Any:
     try:
         import rich.console
         import rich.live
+        import rich.progress
         import rich.table
         import rich.text
     except ImportError as error:

@@ -3,7 +3,7 @@
 import subprocess
 import sys
 
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, TwistStamped
 from icub_leg_fk.kinematics.catalog import config_file
 import numpy as np
 import pytest
@@ -22,16 +22,40 @@ from support.node_harness import (
     SECOND,
 )
 from support.node_oracle import assert_same_pose, oracle_pose
+import yaml
 
+MS = 1_000_000  # ns
 ANGLES = {name: 0.03 * (i + 1) * (-1) ** i for i, name in enumerate(BOTH)}
+BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+LATE = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+PARAMETERS = config_file('foot_pose_publisher.yaml')
+TWIST_QOS = {
+    'qos_overrides.{ns}/foot_pose_publisher/left_foot/twist.publisher.durability':
+        'transient_local',
+    'qos_overrides.{ns}/foot_pose_publisher/right_foot/twist.publisher.reliability':
+        'best_effort',
+}
+RENAMED = ['-r', '__node:=feet', '-r', 'joint_states:=/yarp/state/joints',
+           '-r', '~/left_foot/pose:=/where/left']
+RENAMED_QOS = {
+    'qos_overrides./yarp/state/joints.subscription.reliability': 'reliable',
+    'qos_overrides./yarp/state/joints.subscription.depth': 5000,
+}
 
 
 @pytest.fixture(scope='module')
-def robot():
-    """Return a robot beside a node that loses nothing, however long it is held up."""
-    with NodeProcess(LOSSLESS) as node, Robot(node) as robot:
+def shared():
+    """Return a node that loses nothing, with the shipped parameter file, and a robot beside it."""
+    parameters = {**LOSSLESS, **TWIST_QOS}
+    with NodeProcess(parameters, ['--params-file', str(PARAMETERS)]) as node, \
+            Robot(node) as robot:
         robot.connect()
-        yield robot
+        yield node, robot
+
+
+@pytest.fixture
+def robot(shared):
+    return shared[1]
 
 
 @pytest.fixture(scope='module')
@@ -42,31 +66,27 @@ def default_robot():
         yield robot
 
 
-BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
-LATE = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-
-
-def send_angles(robot, stamp, names):
+def send_angles(robot, stamp, names=BOTH):
     robot.send(stamp, names, [ANGLES.get(name, 9.0) for name in names])
 
 
-def expected(chain, names, version='v2_5', foot_frame='dh'):
-    return oracle_pose(chain, version, [ANGLES[name] for name in names], foot_frame)
+def expected(chain, names, version='v2_5'):
+    return oracle_pose(chain, version, [ANGLES[name] for name in names])
 
 
 def test_names_that_change_between_messages_are_picked_up_at_once(robot):
     start = robot.connect() + SECOND
     orders = [BOTH, RIGHT + LEFT, BOTH[::-1], ('a', *BOTH), BOTH, ('bb', *BOTH[::-1])]
-    for i, names in enumerate(orders):
-        send_angles(robot, start + i, names)
-        pose = robot.take(robot.left, start + i)[-1]
-        robot.take(robot.right, start + i)
+    for stamp, names in enumerate(orders, start):
+        send_angles(robot, stamp, names)
+        pose = robot.take(robot.left, stamp)[-1]
+        robot.take(robot.right, stamp)
         assert_same_pose(pose, expected('left_leg', LEFT))
 
 
 def test_pose_has_the_stamp_of_its_message_and_the_frame_of_the_root(robot):
     stamp = robot.connect() + 123_456_789
-    send_angles(robot, stamp, BOTH)
+    send_angles(robot, stamp)
     for inbox in robot.poses.values():
         pose = robot.take(inbox, stamp)[-1]
         assert pose.header.frame_id == 'root_link'
@@ -75,117 +95,135 @@ def test_pose_has_the_stamp_of_its_message_and_the_frame_of_the_root(robot):
         assert np.isclose(np.linalg.norm([q.x, q.y, q.z, q.w]), 1.0, rtol=0, atol=1e-15)
 
 
-def endpoints(robot, topic, kind):
+def endpoint(robot, kind, topic):
+    """Return type, reliability and durability of the node's publisher or subscription."""
     lister = getattr(robot.node, f'get_{kind}_info_by_topic')
     found = []
 
-    def there():
+    def is_there():
         found[:] = [info for info in lister(topic) if info.node_name == 'foot_pose_publisher']
         return bool(found)
-    robot.until(there, f'{kind} of {topic}')
-    return [(info.topic_type, info.qos_profile.reliability, info.qos_profile.durability)
-            for info in found]
+    robot.until(is_there, f'{kind} of {topic}')
+    [info] = found
+    return info.topic_type, info.qos_profile.reliability, info.qos_profile.durability
 
 
 def test_topics_have_the_types_and_qos_of_the_contract(default_robot):
     robot = default_robot
     volatile = DurabilityPolicy.VOLATILE
-    assert endpoints(robot, '/joint_states', 'subscriptions') == [
-        ('sensor_msgs/msg/JointState', ReliabilityPolicy.BEST_EFFORT, volatile)]
+    assert endpoint(robot, 'subscriptions', '/joint_states') == (
+        'sensor_msgs/msg/JointState', ReliabilityPolicy.BEST_EFFORT, volatile)
     for foot in FEET:
-        assert endpoints(robot, f'/foot_pose_publisher/{foot}/pose', 'publishers') == [
-            ('geometry_msgs/msg/PoseStamped', ReliabilityPolicy.RELIABLE, volatile)]
-    parameters = robot.parameters()
-    depths = {'/joint_states.subscription': 5, '/foot_pose_publisher/left_foot/pose.publisher': 10}
-    for topic, depth in depths.items():
-        answer = robot.result(parameters.get_parameters([f'qos_overrides.{topic}.depth']))
-        assert answer.values[0].integer_value == depth
+        assert endpoint(robot, 'publishers', f'/foot_pose_publisher/{foot}/pose') == (
+            'geometry_msgs/msg/PoseStamped', ReliabilityPolicy.RELIABLE, volatile)
+    pose = '/foot_pose_publisher/left_foot/pose.publisher'
+    names = [f'qos_overrides.{topic}.depth' for topic in ('/joint_states.subscription', pose)]
+    answer = robot.result(robot.parameters().get_parameters(names))
+    assert [value.integer_value for value in answer.values] == [100, 10]
+
+
+def test_shipped_parameter_file_holds_the_defaults(default_robot):
+    robot = default_robot
+    [in_file] = yaml.safe_load(PARAMETERS.read_text()).values()
+    defaults = in_file['ros__parameters']
+    answer = robot.result(robot.parameters().get_parameters([*defaults]))
+    for value, default in zip(answer.values, defaults.values(), strict=True):
+        given = (value.bool_value, value.double_value, value.string_value,
+                 list(value.string_array_value))
+        assert default in given
 
 
 @pytest.mark.parametrize('qos', [BEST_EFFORT, DEEP], ids=['best effort', 'reliable'])
 def test_publishers_of_either_reliability_are_heard(default_robot, qos):
     robot = default_robot
     publisher = robot.node.create_publisher(JointState, 'joint_states', qos)
-    stamp = robot.connect(publisher=publisher)
-    assert stamp > 0
+    robot.connect(publisher=publisher)
     robot.node.destroy_publisher(publisher)
 
 
-def test_qos_can_be_overridden_by_parameters_and_a_mismatch_is_said():
-    pose = 'foot_pose_publisher/{}/pose'.format
-    overrides = {
-        'qos_overrides.{ns}/joint_states.subscription.reliability': 'reliable',
-        f'qos_overrides.{{ns}}/{pose("left_foot")}.publisher.durability': 'transient_local',
-        f'qos_overrides.{{ns}}/{pose("right_foot")}.publisher.reliability': 'best_effort',
-    }
-    with NodeProcess(overrides) as node, Robot(node, tips=()) as robot:
-        joints, left = f'{node.namespace}/joint_states', node.topic('left_foot/pose')
-        assert endpoints(robot, joints, 'subscriptions')[0][1] == ReliabilityPolicy.RELIABLE
-        assert endpoints(robot, left, 'publishers')[0][2] == DurabilityPolicy.TRANSIENT_LOCAL
-        right = endpoints(robot, node.topic('right_foot/pose'), 'publishers')
-        assert right[0][1] == ReliabilityPolicy.BEST_EFFORT
-        diagnostics = robot.diagnostics()
-        robot.status(diagnostics, 'left_leg', lambda status, values: values['poses'] != '0',
-                     meanwhile=lambda: robot.send(SECOND))
-        # Whoever subscribes late to a transient-local topic gets the last pose all the same.
-        inbox = robot.listen(PoseStamped, left, LATE)
-        robot.wait_for(inbox, SECOND)
-        robot.node.create_publisher(JointState, 'joint_states', BEST_EFFORT)
-        node.wait_for_log("publisher discovered on topic 'joint_states', "
-                          'offering incompatible QoS')
-        robot.listen(PoseStamped, node.topic('right_foot/pose'), DEEP)
-        node.wait_for_log("subscription discovered on topic '~/right_foot/pose', requesting "
-                          'incompatible QoS')
+def test_empty_bytes_over_the_default_qos_are_dropped(default_robot):
+    t = default_robot.connect()
+    default_robot.joints.publish(b'')
+    default_robot.connect(t + SECOND)
 
 
-def test_nodes_in_namespaces_work_side_by_side():
-    parameters = {'version': 'v1', **LOSSLESS}, {'frame_prefix': 'blue/', **LOSSLESS}
-    with NodeProcess(parameters[0]) as red_node, Robot(red_node) as red, \
-            NodeProcess(parameters[1]) as blue_node, Robot(blue_node) as blue:
-        for robot, version, frame in ((red, 'v1', 'root_link'), (blue, 'v2_5', 'blue/root_link')):
-            stamp = robot.connect() + 1
-            send_angles(robot, stamp, BOTH)
-            robot.wait_for(robot.left, stamp)
-            pose = robot.take(robot.right, stamp)[-1]
-            assert pose.header.frame_id == frame
-            assert_same_pose(pose, expected('right_leg', RIGHT, version))
-        assert {pose.header.frame_id for pose in red.left} == {'root_link'}
+def test_qos_can_be_overridden_by_parameters_and_a_mismatch_is_said(shared):
+    node, robot = shared
+    left, right = (node.topic(f'{foot}/twist') for foot in FEET)
+    assert robot.change(publish_twist=True).successful
+    joints = endpoint(robot, 'subscriptions', f'{node.namespace}/joint_states')
+    assert joints[1] == ReliabilityPolicy.RELIABLE
+    assert endpoint(robot, 'publishers', left)[2] == DurabilityPolicy.TRANSIENT_LOCAL
+    assert endpoint(robot, 'publishers', right)[1] == ReliabilityPolicy.BEST_EFFORT
+    stamp = robot.connect() + MS
+    robot.send(stamp, velocity=[0.1] * 12)
+    robot.take(robot.right, stamp)
+    # Whoever subscribes late to a transient-local topic gets the last message all the same.
+    robot.wait_for(robot.listen(TwistStamped, left, LATE), stamp)
+    robot.node.create_publisher(JointState, 'joint_states', BEST_EFFORT)
+    node.wait_for_log("publisher discovered on topic 'joint_states', offering incompatible QoS")
+    robot.listen(TwistStamped, right, DEEP)
+    node.wait_for_log("subscription discovered on topic '~/right_foot/twist', requesting "
+                      'incompatible QoS')
 
 
-def test_topics_and_node_can_be_renamed_and_any_chain_chosen():
-    arguments = ['-r', '__node:=feet', '-r', 'joint_states:=/yarp/state/joints',
-                 '-r', '~/left_foot/pose:=/where/left']
-    parameters = {'chains': ['head_imu', 'left_leg'], 'head_imu.version': 'v2',
-                  'left_leg.version': 'v1', 'foot_frame': 'sole',
-                  'qos_overrides./yarp/state/joints.subscription.reliability': 'reliable'}
-    with NodeProcess(parameters, arguments) as node, \
+def test_nodes_in_namespaces_work_side_by_side(robot, default_robot):
+    assert robot.change(version='v1').successful
+    assert default_robot.change(frame_prefix='blue/').successful
+    for each, version, root in ((robot, 'v1', 'root_link'),
+                                (default_robot, 'v2_5', 'blue/root_link')):
+        stamp = each.connect() + 1
+        send_angles(each, stamp)
+        each.wait_for(each.left, stamp)
+        pose = each.take(each.right, stamp)[-1]
+        assert pose.header.frame_id == root
+        assert_same_pose(pose, expected('right_leg', RIGHT, version))
+    assert {pose.header.frame_id for pose in robot.left} == {'root_link'}
+
+
+@pytest.fixture(scope='module')
+def renamed():
+    """Return a robot beside a node of other names and chains, and the last stamp it sent."""
+    parameters = {'chains': ['head_imu=v2', 'left_leg=v1'], 'foot_frame': 'sole', **RENAMED_QOS}
+    with NodeProcess(parameters, RENAMED) as node, \
             Robot(node, tips=['head_imu'], name='feet') as robot:
-        publisher = robot.node.create_publisher(JointState, '/yarp/state/joints', DEEP)
-        left = robot.listen(PoseStamped, '/where/left')
-        names = (*LEFT, *HEAD)
-        stamp = robot.connect(names=names, inboxes=[robot.poses['head_imu'], left],
-                              publisher=publisher) + 1
-        positions = [0.1, 0.2, -0.1, -0.3, 0.2, 0.1, *[0.1 * i for i in range(6)]]
-        robot.send(stamp, names, positions, publisher)
-        assert_same_pose(robot.take(left, stamp)[-1],
-                         oracle_pose('left_leg', 'v1', positions[:6], 'sole'))
-        assert_same_pose(robot.take(robot.poses['head_imu'], stamp)[-1],
-                         oracle_pose('head_imu', 'v2', positions[6:]))
+        robot.torso = robot.node.create_publisher(JointState, '/yarp/state/joints', DEEP)
+        robot.left = robot.listen(PoseStamped, '/where/left')
+        robot.head = robot.poses['head_imu']
+        stamp = robot.connect(names=LEFT + HEAD, inboxes=[robot.head, robot.left],
+                              publisher=robot.torso)
         assert 'head_imu has no sole' in node.log()
+        yield node, robot, stamp
 
 
-def test_shipped_parameter_file_is_taken_and_holds_the_defaults(default_robot):
-    robot = default_robot
-    file = str(config_file('foot_pose_publisher.yaml'))
-    names = ['chains', 'version', 'left_leg.version', 'right_leg.version', 'kinematics_file',
-             'foot_frame', 'frame_prefix', 'joint_timeout', 'stamp_source', 'publish_tf',
-             'publish_twist', 'publish_markers']
-    defaults = robot.result(robot.parameters().get_parameters(names)).values
-    with NodeProcess(arguments=['--params-file', file]) as node, \
-            Robot(node) as other:
-        assert other.result(other.parameters().get_parameters(names)).values == defaults
-        own = other.result(other.parameters().get_parameters(['head_imu.version'])).values
-        assert own[0].string_value == 'v2'
+def test_topics_and_node_can_be_renamed_and_any_chain_chosen(renamed):
+    _, robot, stamp = renamed
+    q = [0.1, 0.2, -0.1, -0.3, 0.2, 0.1]
+    head_q = [0.1 * i for i in range(6)]
+    robot.send(stamp + 1, LEFT + HEAD, q + head_q, robot.torso)
+    assert_same_pose(robot.take(robot.left, stamp + 1)[-1],
+                     oracle_pose('left_leg', 'v1', q, 'sole'))
+    assert_same_pose(robot.take(robot.head, stamp + 1)[-1],
+                     oracle_pose('head_imu', 'v2', head_q))
+
+
+def test_torso_and_neck_from_two_publishers_interleave_out_of_order(renamed):
+    node, robot, stamp = renamed
+    neck = robot.node.create_publisher(JointState, '/yarp/state/joints', DEEP)
+    start = robot.connect(stamp + MS, HEAD, [robot.head], neck)
+    torso_q = neck_q = [0.0] * 3
+    for i in range(1, 6):
+        torso_at = start + 10 * i * MS
+        torso_q = [0.01 * (i + k) for k in range(3)]
+        robot.send(torso_at, HEAD[:3], torso_q, robot.torso)
+        pose = robot.take(robot.head, torso_at)[-1]
+        if i > 1:
+            assert_same_pose(pose, oracle_pose('head_imu', 'v2', torso_q + neck_q))
+        neck_q = [0.01 * (i + k) for k in range(3, 6)]
+        robot.send(torso_at - MS, HEAD[3:], neck_q, neck)
+        pose = robot.take(robot.head, torso_at - MS)[-1]
+        assert_same_pose(pose, oracle_pose('head_imu', 'v2', torso_q + neck_q))
+    assert 'time stepped back' not in node.log()
 
 
 def test_help_is_shown_without_a_node():

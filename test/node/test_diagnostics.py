@@ -1,178 +1,236 @@
-"""What the node says of itself on /diagnostics."""
+"""What the node says of its health, on /diagnostics and in its log.
 
-import math
-import time
+What there is to say, and when, is held in memory by test_health.py and test/stream/test_notes.py.
+"""
 
-from diagnostic_msgs.msg import DiagnosticStatus
-from geometry_msgs.msg import TwistStamped
+from itertools import pairwise
+from statistics import median
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import PoseStamped
 import pytest
-from support.node_harness import BOTH, LEFT, LOSSLESS, nanoseconds, NodeProcess, Robot, SECOND
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from support.node_harness import (
+    BOTH,
+    LEFT,
+    LOSSLESS,
+    nanoseconds,
+    NodeProcess,
+    RIGHT,
+    Robot,
+    SECOND,
+)
 
-MS = 1_000_000  # ns
-OK, WARN, ERROR, STALE = (DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR,
-                          DiagnosticStatus.STALE)
-REASONS = ('malformed', 'empty_position', 'short_position', 'duplicate_name', 'time_jump')
-
-
-class Traffic:
-    """Sends joint states with stamps that go on by a millisecond each."""
-
-    def __init__(self, robot):
-        self.robot = robot
-        self.stamp = SECOND
-
-    def __call__(self, names=BOTH, positions=None, **fields):
-        self.stamp += MS
-        self.robot.send(self.stamp, names, positions, **fields)
-
-    def sender(self, *arguments, **fields):
-        return lambda: self(*arguments, **fields)
+OK, WARN, ERROR, STALE = (
+    DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR, DiagnosticStatus.STALE)
+REASONS = ('malformed', 'empty_position', 'position_length', 'duplicate_name', 'time_jump')
+DEGREES = [0.0, 0.0, 0.0, -45.0, 0.0, 0.0] * 2
+SILENCE = 'no JointState received on {}/joint_states for '
+NO_TIME = 'use_sim_time is set, but no time has come on /clock'
 
 
 @pytest.fixture(scope='module')
-def shared():
-    """Return a robot beside a node, its diagnostics and its traffic."""
+def waiting():
+    """Return a node that waits for joint states and for time, and a robot that sends neither."""
+    with NodeProcess({'use_sim_time': True}, ['-r', '/clock:=clock']) as node, \
+            Robot(node) as robot:
+        robot.node.destroy_publisher(robot.joints)
+        robot.node.create_publisher(String, 'joint_states', 10)
+        robot.everything = robot.listen(DiagnosticArray, '/diagnostics')
+        yield node, robot
+
+
+@pytest.fixture(scope='module')
+def shared(waiting):
+    """Return a busy node, beside which the other one is waiting, and a robot."""
     with NodeProcess(LOSSLESS) as node, Robot(node) as robot:
-        yield robot, robot.diagnostics(), Traffic(robot)
+        yield node, robot
 
 
-def level(wanted, *words, rate=0.0):
-    """Return a condition: the level, words of the message, and more than a rate [Hz]."""
-    return lambda status, values: (status.level == wanted and float(values['rate (Hz)']) >= rate
-                                   and all(word in status.message for word in words))
+@pytest.fixture
+def robot(shared):
+    return shared[1]
 
 
-def test_stale_until_the_first_joint_state(shared):
-    robot, inbox, _ = shared
-    for chain in ('left_leg', 'right_leg'):
-        status, values = robot.status(inbox, chain, level(STALE))
-        assert status.message.startswith('no JointState received')
+def send_now(robot, names=BOTH, positions=None, ago=0.0, **more):
+    """Send a joint state with a stamp so many seconds ago."""
+    now = robot.node.get_clock().now().nanoseconds
+    robot.send(now - round(ago * 1e9), names, positions, **more)
+
+
+def levels(statuses):
+    return [status.level for status in statuses.values()]
+
+
+def are_ok(statuses):
+    return levels(statuses) == [OK, OK]
+
+
+def lines(node, severity):
+    """Return what a node has said, from the text on."""
+    marked = [line for line in node.log().splitlines() if f'[{severity}]' in line]
+    return [line.partition('foot_pose_publisher]: ')[2] for line in marked]
+
+
+def test_the_start_line_says_what_is_published_and_from_where(waiting):
+    node, _ = waiting
+    node.wait_for_log('publishing')
+    assert lines(node, 'INFO') == [
+        'publishing poses of left_foot (left_leg=v2_5, root_link to l_foot_dh_frame), right_foot '
+        '(right_leg=v2_5, root_link to r_foot_dh_frame); joint states from '
+        f'{node.namespace}/joint_states']
+
+
+def test_stale_until_the_first_joint_state(waiting):
+    node, robot = waiting
+    statuses = robot.statuses(lambda statuses: 'only of' in statuses['left_leg'].message)
+    assert [*statuses] == ['left_leg', 'right_leg']
+    for level, message, _, values in statuses.values():
+        assert level == STALE
+        assert message.startswith(SILENCE.format(node.namespace))
+        assert '; it has no publisher of this type, only of std_msgs/msg/String; ' in message
+        assert message.endswith(NO_TIME)
         assert (values['messages'], values['poses'], values['age (s)']) == ('0', '0', '')
 
 
-def test_ok_with_rate_age_and_counts(shared):
-    robot, inbox, send = shared
-    robot.status(inbox, 'right_leg', level(OK), meanwhile=send)
-    status, values = robot.status(inbox, 'left_leg', level(OK, rate=5), meanwhile=send)
-    assert status.hardware_id == 'left_leg v2_5'
+def test_ok_with_rate_age_and_counts(robot):
+    status = robot.statuses(
+        lambda statuses: float(statuses['left_leg'].values['rate (Hz)']) > 5,
+        meanwhile=lambda: send_now(robot))['left_leg']
+    assert (status.level, status.message) == (OK, 'publishing')
+    assert status.hardware_id == 'left_leg=v2_5'
+    values = status.values
     assert int(values['poses']) == int(values['messages']) > 0
-    assert float(values['age (s)']) > 1e6  # stamps of the test begin in 1970
+    assert 0 <= float(values['age (s)']) < 1
+    assert (values['version'], values['publishers']) == ('v2_5', '1')
     assert [values[reason] for reason in REASONS] == ['0'] * len(REASONS)
 
 
-def test_stale_again_when_the_joint_states_stop(shared):
-    robot, inbox, _ = shared
-    assert robot.status(inbox, 'left_leg', level(STALE))[1]['rate (Hz)'] == '0.0'
+def test_the_age_of_a_dead_leg_beside_a_live_one_grows(robot):
+    send_now(robot, ago=3)  # everything held is forgotten
+    send_now(robot, LEFT)
+    statuses = robot.statuses(lambda statuses: levels(statuses) == [OK, ERROR],
+                              meanwhile=lambda: send_now(robot, LEFT))
+    _, message, _, values = statuses['right_leg']
+    assert f'has one of its joints ({", ".join(RIGHT)}); names that came: l_hip_pitch' in message
+    assert 0 <= float(statuses['left_leg'].values['age (s)']) < 1
+    assert float(values['age (s)']) > 3
 
 
-def test_warning_names_joints_out_of_range(shared):
-    robot, inbox, send = shared
-    positions = [0.0] * 5 + [0.6] + [0.0] * 6
-    _, values = robot.status(inbox, 'left_leg', level(WARN, 'l_ankle_roll 0.6', rate=2),
-                             meanwhile=send.sender(BOTH, positions))
-    assert values['out_of_range joints'] == 'l_ankle_roll 0.6'
+def test_rejected_messages_are_a_warning_once_and_stay_counted(robot):
+    def send():
+        send_now(robot)
 
-
-def test_rejected_messages_are_a_warning_once_and_stay_counted(shared):
-    robot, inbox, send = shared
-    values = robot.status(inbox, 'right_leg', level(OK), meanwhile=send)[1]
-    before = {reason: int(values[reason]) for reason in REASONS}
-    send(BOTH, [0.0] * 11)
-    send((*BOTH, 'l_knee'), [0.0] * 13)
-    send(BOTH, [])
+    def counts(statuses):
+        return [int(statuses['right_leg'].values[reason]) for reason in REASONS]
+    before = counts(robot.statuses(are_ok, meanwhile=send))
+    send_now(robot, positions=[0.0] * 13)
+    send_now(robot, (*BOTH, 'l_knee'))
+    send_now(robot, positions=[])
     robot.joints.publish(b'\x00\x01\x00\x00')
-    send.stamp -= SECOND // 100
+    send_now(robot, ago=5)
     said = []
 
-    def all_counted(status, values):  # the five may fall into two periods
-        said.append(status.message)
-        return all(int(values[reason]) > before[reason] for reason in REASONS)
-    _, values = robot.status(inbox, 'right_leg', all_counted, meanwhile=send)
-    for reason in REASONS:
-        if reason != 'empty_position':  # is counted only
-            assert sum(f'{reason} 1' in text for text in said) == 1, said
-        assert int(values[reason]) == before[reason] + 1
-    _, later = robot.status(inbox, 'right_leg', level(OK), meanwhile=send)
-    assert {later[reason] for reason in REASONS} == {values[reason] for reason in REASONS}
+    def all_are_counted(statuses):  # the five may fall into two periods
+        said.append(statuses['right_leg'].message)
+        return counts(statuses) == [count + 1 for count in before]
+    robot.statuses(all_are_counted, meanwhile=send)
+    text = '; '.join(said)
+    for words in ('position has 13 values for 12 names', "name 'l_knee' appears twice",
+                  'header.stamp ends at byte 12', 'time stepped back to'):
+        assert text.count(words) == 1, text
+    assert 'position is empty' not in text
+    after = counts(robot.statuses(are_ok, meanwhile=send))
+    assert after == [count + 1 for count in before]
 
 
-def test_an_empty_position_is_counted_only(shared):
-    robot, inbox, send = shared
-    before = robot.status(inbox, 'right_leg', level(OK), meanwhile=send)[1]['empty_position']
-    send(BOTH, [])
-    status, _ = robot.status(
-        inbox, 'right_leg', lambda status, values: values['empty_position'] != before,
-        meanwhile=send)
-    assert status.level != WARN
+def test_joints_out_of_range_and_missing_are_named(robot):
+    names = (*LEFT, *RIGHT[:4])
+    positions = [0.0] * 5 + [0.6] + [0.0] * 4
+    send_now(robot, names, positions, ago=10)  # everything held is forgotten
+    missing = 'r_ankle_pitch never seen, r_ankle_roll never seen'
+    statuses = robot.statuses(lambda statuses: missing in statuses['right_leg'].message,
+                              meanwhile=lambda: send_now(robot, names, positions))
+    level, message, _, values = statuses['left_leg']
+    assert level == WARN
+    assert 'out of range: l_ankle_roll 0.6' in message
+    assert values['out_of_range joints'] == 'l_ankle_roll 0.6'
+    level, message, _, values = statuses['right_leg']
+    assert values['missing_joint joints'] == missing
+    assert int(values['missing_joint']) > 0
 
 
-def test_stale_joint_is_named_in_a_warning_while_some_poses_go_out(shared):
-    robot, inbox, send = shared
+def test_first_poses_degrees_and_publishers_of_the_same_joints_are_said_once(shared):
+    node, robot = shared
+    second = robot.node.create_publisher(JointState, 'joint_states', 10)
 
-    def now_and_then_all():
-        send()
-        send.stamp += SECOND
-        send([name for name in BOTH if name != 'l_hip_yaw'])
-    _, values = robot.status(inbox, 'left_leg', level(WARN, 'stale: l_hip_yaw 1.001 s old'),
-                             meanwhile=now_and_then_all)
-    assert values['stale_joint joints'] == 'l_hip_yaw 1.001 s old'
-    assert int(values['stale_joint']) > 0
-
-
-def test_stale_joint_is_named_in_an_error_while_none_goes_out(shared):
-    robot, inbox, send = shared
-    send.stamp += 10 * SECOND
-    names = [name for name in BOTH if name != 'l_hip_yaw']
-    robot.status(inbox, 'left_leg', level(ERROR, 'stale: l_hip_yaw'), meanwhile=send.sender(names))
-
-
-def test_error_names_the_joints_that_are_missing(shared):
-    robot, inbox, send = shared
-    send.stamp -= 5 * SECOND  # everything held is forgotten
-    ankle = ('l_ankle_pitch', 'l_ankle_roll')
-    _, values = robot.status(inbox, 'left_leg', level(ERROR, *ankle),
-                             meanwhile=send.sender(LEFT[:4]))
-    for name in ankle:
-        assert name in values['missing_joint joints']
-    robot.status(inbox, 'right_leg', level(ERROR, 'r_knee'), meanwhile=send.sender(LEFT[:4]))
+    def send():
+        send_now(robot, positions=DEGREES)
+        send_now(robot, positions=DEGREES, publisher=second)
+    topic = f'{node.namespace}/joint_states'
+    two = f'every message on {topic} brings its joints, and it has 2 publishers: '
+    for _ in range(2):
+        statuses = robot.statuses(lambda statuses: two in statuses['left_leg'].message,
+                                  meanwhile=send)
+        assert 'positions look like degrees' in statuses['left_leg'].message
+    robot.node.destroy_publisher(second)
+    said = lines(node, 'WARN')
+    degrees = 'positions look like degrees, radians are expected: '
+    assert said.count(f'left_leg: {degrees}l_knee -45') == 1
+    assert sum(f'left_leg: {two}{node.namespace}/robot, ' in line for line in said) == 1
+    said = lines(node, 'INFO')
+    for foot in ('left_foot', 'right_foot'):
+        assert said.count(f'first pose of {foot}; 1 publisher on {topic}') == 1
 
 
-def test_error_names_the_joint_that_is_not_a_number(shared):
-    robot, inbox, send = shared
-    status, values = robot.status(
-        inbox, 'left_leg', lambda status, values: 'l_knee nan' in status.message,
-        meanwhile=send.sender(LEFT, [0, 0, 0, math.nan, 0, 0]))
-    assert status.level == ERROR
-    assert values['non_finite joints'] == 'l_knee nan'
+def test_another_node_of_the_same_name_is_a_warning(shared):
+    node, robot = shared
+    twin = Node('foot_pose_publisher', namespace=node.namespace, context=robot.node.context)
+    twin.create_publisher(PoseStamped, '~/left_foot/pose', 10)
+    words = f'another node is called {node.namespace}/foot_pose_publisher'
+    robot.statuses(lambda statuses: words in statuses['left_leg'].message,
+                   meanwhile=lambda: send_now(robot))
+    twin.destroy_node()
 
 
-def test_poses_without_velocity_are_counted_where_twists_are_wanted():
-    with NodeProcess({'publish_twist': True}) as node, Robot(node) as robot:
-        twists = robot.listen(TwistStamped, 'foot_pose_publisher/left_foot/twist')
-        send, inbox = Traffic(robot), robot.diagnostics()
-        _, values = robot.status(inbox, 'left_leg', level(WARN), meanwhile=send)
-        assert int(values['no_velocity']) > 0
-        assert values['no_velocity joints'] == ', '.join(f'{joint} unknown' for joint in LEFT)
-        robot.status(inbox, 'left_leg', level(OK),
-                     meanwhile=send.sender(BOTH, velocity=[0.1] * 12))
-        robot.until(lambda: twists, 'twists')
+def test_a_change_of_parameters_is_said_once(shared):
+    node, robot = shared
+    before = len(lines(node, 'INFO'))
+    for changes in ({'joint_timeout': 0.2}, {'version': 'v1'}, {'version': 'v3'},
+                    {'foot_frame': 'sole'}, {'stamp_source': 'now'}):
+        assert robot.change(**changes).successful
+    node.wait_for_log('l_sole')
+    said = [line for line in lines(node, 'INFO')[before:] if 'publishing' in line]
+    assert '(left_leg=v3, root_link to l_sole)' in said[-1]
+    assert len(said) <= 3  # each second that had a change
 
 
-def test_once_a_second_though_simulated_time_stands_still():
-    with NodeProcess({'use_sim_time': True}) as node, Robot(node) as robot:
-        times, stamps = [], []
-        inbox = robot.diagnostics()
+def test_what_does_not_come_is_warned_of_after_five_seconds(waiting):
+    node, _ = waiting
+    node.wait_for_log('no JointState')
+    node.wait_for_log('no time')
+    silence, time_is_missing = lines(node, 'WARN')
+    assert silence.startswith(SILENCE.format(node.namespace))
+    assert time_is_missing == NO_TIME
 
-        def take():
-            for array in inbox:
-                if array.status[0].name.startswith(node.namespace[1:]):
-                    times.append(time.monotonic())
-                    stamps.append(nanoseconds(array.header.stamp))
-                    assert [status.name for status in array.status] == [
-                        f'{node.namespace[1:]}/foot_pose_publisher: {chain}'
-                        for chain in ('left_leg', 'right_leg')]
-            inbox.clear()
-            # Any may come late on a busy machine, which makes two periods uneven: three will not.
-            return any(abs(third - first - 2) < 0.4 for first, third in zip(times, times[2:]))
-        robot.until(take, times)
-        assert stamps == [0] * len(stamps)  # simulated time, which has not begun
+
+def test_once_a_second_though_simulated_time_stands_still(waiting, shared):
+    """Beside a node whose time goes on; any period may be uneven on a busy machine."""
+    _, robot = waiting
+    busy = shared[0].namespace.lstrip('/')
+    began = robot.node.get_clock().now().nanoseconds
+    stamps = []
+
+    def are_up_to_date():
+        stamps[:] = [nanoseconds(array.header.stamp) for array in robot.everything
+                     if array.status[0].name.startswith(busy)]
+        return stamps[-1:] > [began]
+    robot.until(are_up_to_date, stamps)
+    periods = [after - before for before, after in pairwise(stamps)]
+    assert median(periods) == pytest.approx(SECOND, rel=0.1)
+    others = [nanoseconds(array.header.stamp) for array in robot.everything
+              if not array.status[0].name.startswith(busy)]
+    assert others == [0] * len(others)  # simulated time, which has not begun
+    assert len(others) >= len(stamps) - 1

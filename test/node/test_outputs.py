@@ -12,16 +12,29 @@ from visualization_msgs.msg import Marker, MarkerArray
 MS = 1_000_000  # ns
 Q = np.array([0.2, 0.1, -0.1, -0.5, -0.3, 0.1, 0.15, 0.05, 0.1, -0.4, -0.2, -0.1])
 CHAINS = dict(zip(FEET, (('left_leg', slice(6)), ('right_leg', slice(6, 12))), strict=True))
+SOLE = [[-0.07, 0.04, 0.0], [0.12, 0.04, 0.0], [0.12, -0.04, 0.0], [-0.07, -0.04, 0.0]]
+POSE_TOPICS = {f'{tip}/pose' for tip in FEET}
+TWIST_TOPICS = {f'{tip}/twist' for tip in FEET}
+TWIST_DEPTH = {f'qos_overrides.{{ns}}/foot_pose_publisher/{tip}/twist.publisher.depth': 5000
+               for tip in FEET}
+
+
+@pytest.fixture(scope='module')
+def shared():
+    """Return a node that publishes poses alone, and a robot beside it."""
+    with NodeProcess({**LOSSLESS, **TWIST_DEPTH}) as node, Robot(node) as robot:
+        robot.connect()
+        yield node, robot
 
 
 class Twists:
     """A robot beside a node that publishes twists."""
 
     def __init__(self, node, robot):
-        self.node, self.robot = node, robot
+        self.robot = robot
         self.inboxes = {tip: robot.listen(TwistStamped, node.topic(f'{tip}/twist'))
                         for tip in FEET}
-        self.stamp = SECOND
+        self.stamp = robot.connect() + SECOND
 
         def answered():
             self.send(Q, np.zeros(12))
@@ -41,12 +54,39 @@ class Twists:
 
 
 @pytest.fixture(scope='module')
-def twists():
-    """Return a robot beside a node that publishes twists."""
-    deep = {f'qos_overrides.{{ns}}/foot_pose_publisher/{tip}/twist.publisher.depth': 5000
-            for tip in FEET}
-    with NodeProcess({'publish_twist': True, **LOSSLESS, **deep}) as node, Robot(node) as robot:
-        yield Twists(node, robot)
+def twists(shared):
+    node, robot = shared
+    assert robot.change(publish_twist=True).successful
+    return Twists(node, robot)
+
+
+def own_topics(node, robot, wanted):
+    """Return the topics that the node offers, once it offers those that are wanted."""
+    name, namespace = 'foot_pose_publisher', node.namespace
+    wanted = {node.topic(topic) for topic in wanted}
+    offered = set()
+
+    def is_there():  # a node's name is announced apart from its topics
+        offered.clear()
+        if (name, namespace) not in robot.node.get_node_names_and_namespaces():
+            return False
+        found = robot.node.get_publisher_names_and_types_by_node(name, namespace)
+        offered.update(topic for topic, _ in found)
+        return wanted <= offered
+    robot.until(is_there, offered)
+    return {topic.removeprefix(node.topic('')) for topic in offered}
+
+
+def test_no_other_topic_is_offered_unless_asked_for(shared):
+    node, robot = shared
+    # Announcements come in order: once the twists are there, whatever was before them is.
+    assert robot.change(publish_twist=True).successful
+    offered = own_topics(node, robot, TWIST_TOPICS)
+    own = POSE_TOPICS | TWIST_TOPICS
+    assert own <= offered
+    assert offered - own <= {'/diagnostics', '/rosout', '/parameter_events'}
+    assert robot.change(publish_twist=False).successful
+    robot.until(lambda: own_topics(node, robot, POSE_TOPICS).isdisjoint(TWIST_TOPICS), 'no twists')
 
 
 def vector(twist):
@@ -64,84 +104,94 @@ def test_twist_is_the_jacobian_times_the_velocities(twists):
         for tip, (chain, part) in CHAINS.items():
             assert answers[tip].stamps() == poses[tip].stamps() == [twists.stamp]
             assert answers[tip][0].header.frame_id == 'root_link'
+            J = oracle_jacobian(chain, 'v2_5', q[part])
             np.testing.assert_allclose(
-                vector(answers[tip][0]), oracle_jacobian(chain, 'v2_5', q[part]) @ qdot[part],
-                rtol=0, atol=1e-12)
+                vector(answers[tip][0]), J @ qdot[part], rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize('qdot', [[], [0.1] * 11, [0.1] * 11 + [np.nan], [np.inf] + [0.1] * 11],
-                         ids=['none', 'short', 'nan', 'inf'])
-def test_no_twist_without_all_velocities_but_the_pose_goes_out(twists, qdot):
+@pytest.mark.parametrize(('qdot', 'feet'), [
+    ([], []), ([0.1] * 11, []), ([0.1] * 11 + [np.nan], ['left_foot']),
+    ([np.inf] + [0.1] * 11, ['right_foot'])], ids=['none', 'short', 'nan', 'inf'])
+def test_no_twist_without_all_velocities_but_the_pose_goes_out(twists, qdot, feet):
     twists.send(Q, qdot)
     bad = twists.stamp
     twists.send(Q, np.ones(12))
     poses, answers = twists.answers()
     for tip in FEET:
         assert poses[tip].stamps() == [bad, twists.stamp]
-    whole = len(qdot) == 12
-    assert (bad in answers['left_foot'].stamps()) == (whole and np.isfinite(qdot[:6]).all())
-    assert (bad in answers['right_foot'].stamps()) == (whole and np.isfinite(qdot[6:]).all())
+        assert (bad in answers[tip].stamps()) == (tip in feet)
 
 
-def test_frame_prefix_holds_for_twists_and_topics_go_when_they_are_switched_off(twists):
-    robot, node = twists.robot, twists.node
+def test_frame_prefix_holds_for_twists_and_topics_go_when_they_are_switched_off(shared, twists):
+    node, robot = shared
     assert robot.change(frame_prefix='a/').successful
     twists.send(Q, np.ones(12))
     _, answers = twists.answers()
     assert answers['left_foot'][0].header.frame_id == 'a/root_link'
-    topic = node.topic('left_foot/twist')
-    robot.until(lambda: robot.node.count_publishers(topic) == 1, 'the twist topic')
     assert robot.change(publish_twist=False, frame_prefix='').successful
+    topic = node.topic('left_foot/twist')
     robot.until(lambda: robot.node.count_publishers(topic) == 0, 'the twist topic to go')
 
 
-def test_skeletons_go_through_the_frames_of_each_leg_to_the_outline_of_its_sole():
-    with NodeProcess({'publish_markers': True, 'frame_prefix': 'x/', 'foot_frame': 'sole'}) \
-            as node, Robot(node) as robot:
-        inbox = []
-        robot.node.create_subscription(MarkerArray, node.topic('skeleton'), inbox.append, 10)
-        by_chain = {}
-
-        def both_skeletons():
-            robot.send(SECOND, BOTH, Q)
-            by_chain.update({array.markers[0].ns: array.markers for array in inbox})
-            return len(by_chain) >= 2
-        robot.until(both_skeletons, 'skeletons')
-        assert set(by_chain) == {'left_leg', 'right_leg'}
-        for chain, part in CHAINS.values():
-            frames = Catalog.load().chain(chain, 'v2_5', 'sole').frames(Q[part])
-            *legs, sole = by_chain[chain]
-            corners = np.array([[point.x, point.y, point.z] for point in sole.points])
-            R, p = np.split(oracle_pose(chain, 'v2_5', Q[part], 'sole')[:3], [3], axis=1)
-            np.testing.assert_allclose(  # in the sole's axes: x forward, y left, z up
-                (corners - p.T) @ R, [[x, y, 0.0] for x, y in (
-                    (-0.07, 0.04), (0.12, 0.04), (0.12, -0.04), (-0.07, -0.04), (-0.07, 0.04))],
-                rtol=0, atol=1e-12)
-            for marker in by_chain[chain]:
-                assert marker.header.frame_id == 'x/root_link'
-                assert (marker.header.stamp.sec, marker.header.stamp.nanosec) == (1, 0)
-                assert (marker.action, marker.color.a) == (Marker.ADD, 1.0)
-            for marker in legs:
-                points = np.array([[point.x, point.y, point.z] for point in marker.points])
-                np.testing.assert_allclose(points[1:], frames[:, :3, 3], rtol=0, atol=1e-12)
-                np.testing.assert_allclose(
-                    points[-1], oracle_pose(chain, 'v2_5', Q[part])[:3, 3], atol=1e-12)
-                assert not points[0].any()
-            assert [marker.type for marker in by_chain[chain]] == [
-                Marker.LINE_STRIP, Marker.SPHERE_LIST, Marker.LINE_STRIP]
-        # Viewers forget the skeletons of chains that are dropped.
-        robot.spin()
-        inbox.clear()
-        assert robot.change(chains=['right_leg']).successful
-        robot.until(lambda: any(array.markers[0].action == Marker.DELETEALL for array in inbox),
-                    'removal of the skeletons')
+def points_of(marker):
+    return np.array([[point.x, point.y, point.z] for point in marker.points])
 
 
-def test_transforms_are_refused_in_one_line_where_tf2_msgs_is_missing(twists):
+def test_skeletons_go_through_the_frames_of_each_leg_to_the_outline_of_its_sole(shared):
+    node, robot = shared
+    assert robot.change(publish_markers=True, frame_prefix='x/', foot_frame='sole').successful
+    inbox = []
+    robot.node.create_subscription(MarkerArray, node.topic('skeleton'), inbox.append, 10)
+    by_chain = {}
+
+    def both_skeletons():
+        robot.send(SECOND, BOTH, Q)
+        by_chain.update({array.markers[0].ns: array.markers for array in inbox})
+        return len(by_chain) >= 2
+    robot.until(both_skeletons, 'skeletons')
+    assert set(by_chain) == {'left_leg', 'right_leg'}
+    for chain, part in CHAINS.values():
+        for marker in by_chain[chain]:
+            assert marker.header.frame_id == 'x/root_link'
+            assert (marker.header.stamp.sec, marker.header.stamp.nanosec) == (1, 0)
+            assert (marker.action, marker.color.a) == (Marker.ADD, 1.0)
+        bones, joints, name, sole = by_chain[chain]
+        assert (bones.type, joints.type, name.type, sole.type) == (
+            Marker.LINE_STRIP, Marker.SPHERE_LIST, Marker.TEXT_VIEW_FACING, Marker.LINE_STRIP)
+        frames = Catalog.load().chain(chain, 'v2_5', 'sole').frames(Q[part])
+        foot = oracle_pose(chain, 'v2_5', Q[part])[:3, 3]
+        for marker in (bones, joints):
+            points = points_of(marker)
+            assert not points[0].any()
+            np.testing.assert_allclose(points[1:], frames[:, :3, 3], rtol=0, atol=1e-12)
+            np.testing.assert_allclose(points[-1], foot, rtol=0, atol=1e-12)
+        T = oracle_pose(chain, 'v2_5', Q[part], 'sole')  # x forward, y left, z up
+        corners = (points_of(sole) - T[:3, 3]) @ T[:3, :3]
+        np.testing.assert_allclose(corners, [*SOLE, SOLE[0]], rtol=0, atol=1e-12)
+
+
+def test_viewers_forget_the_skeletons_of_what_is_published_no_more(shared):
+    node, robot = shared
+    assert robot.change(publish_markers=True).successful
+    inbox = []
+    robot.node.create_subscription(MarkerArray, node.topic('skeleton'), inbox.append, 10)
+
+    def is_heard():
+        robot.send(SECOND, BOTH, Q)
+        return bool(inbox)
+    robot.until(is_heard, 'skeletons')
+    assert robot.change(version='v1').successful
+    robot.until(lambda: any(array.markers[0].action == Marker.DELETEALL for array in inbox),
+                'removal of the skeletons')
+    assert robot.change(
+        version='v2_5', publish_markers=False, frame_prefix='', foot_frame='dh').successful
+
+
+def test_transforms_are_refused_in_one_line_where_tf2_msgs_is_missing(shared):
     try:
         import tf2_msgs
     except ImportError:
-        result = twists.robot.change(publish_tf=True)
+        result = shared[1].change(publish_tf=True)
         assert not result.successful
         assert 'tf2_msgs' in result.reason
         assert '\n' not in result.reason
@@ -149,55 +199,32 @@ def test_transforms_are_refused_in_one_line_where_tf2_msgs_is_missing(twists):
         pytest.skip(f'tf2_msgs is there: {tf2_msgs.__file__}')
 
 
-@pytest.mark.parametrize('foot_frame, children', [
+@pytest.mark.parametrize(('foot_frame', 'children'), [
     ('dh', ['l_foot_dh_frame', 'r_foot_dh_frame']), ('sole', ['l_sole', 'r_sole'])])
-def test_transforms_are_those_of_the_poses(foot_frame, children):
-    pytest.importorskip('tf2_msgs', reason='tf2_msgs is not installed, nothing can be sent to /tf')
-    from tf2_msgs.msg import TFMessage
-    parameters = {'publish_tf': True, 'frame_prefix': 'x/', 'foot_frame': foot_frame}
-    with NodeProcess(parameters) as node, Robot(node) as robot:
-        inbox = []
-        robot.node.create_subscription(TFMessage, '/tf', inbox.append, 10)
-        found = {}
+def test_transforms_are_those_of_the_poses(shared, foot_frame, children):
+    messages = pytest.importorskip(
+        'tf2_msgs.msg', reason='tf2_msgs is not installed, nothing can be sent to /tf')
+    _, robot = shared
+    assert robot.change(publish_tf=True, frame_prefix='x/', foot_frame=foot_frame).successful
+    inbox = []
+    robot.node.create_subscription(messages.TFMessage, '/tf', inbox.append, 10)
+    found = {}
 
-        def both_transforms():
-            robot.send(SECOND, BOTH, Q)
-            assert all(len(message.transforms) == 2 for message in inbox)
-            found.update({transform.child_frame_id: transform
-                          for message in inbox for transform in message.transforms})
-            return len(found) >= 2
-        robot.until(both_transforms, 'transforms')
-        qos = robot.node.get_publishers_info_by_topic('/tf')[0].qos_profile
-        assert (qos.reliability, qos.durability) == (
-            ReliabilityPolicy.RELIABLE, DurabilityPolicy.VOLATILE)
-        for child, (chain, part) in zip(children, CHAINS.values(), strict=True):
-            transform = found[f'x/{child}']
-            assert transform.header.frame_id == 'x/root_link'
-            assert transform.header.stamp.sec == 1
-            np.testing.assert_allclose(
-                pose_matrix(transform.transform),
-                oracle_pose(chain, 'v2_5', Q[part], foot_frame), rtol=0, atol=1e-12)
-
-
-def test_no_other_topic_is_offered_unless_asked_for():
-    poses, twists = ({f'{tip}/{kind}' for tip in FEET} for kind in ('pose', 'twist'))
-    with NodeProcess(LOSSLESS) as node, Robot(node) as robot:
-        name, namespace, offered = 'foot_pose_publisher', node.namespace, set()
-
-        def offers(names):  # a node's name is announced apart from its topics
-            offered.clear()
-            if (name, namespace) in robot.node.get_node_names_and_namespaces():
-                found = robot.node.get_publisher_names_and_types_by_node(name, namespace)
-                offered.update(topic for topic, _ in found)
-            return {node.topic(name) for name in names} <= offered
-
-        def own():
-            return {topic for topic in offered if topic.startswith(node.topic(''))}
-        # Announcements come in order: once the twists are there, whatever was before them is.
-        assert robot.change(publish_twist=True).successful
-        robot.until(lambda: offers(poses | twists), ('twists', offered))
-        assert own() == {node.topic(name) for name in poses | twists}
-        assert '/tf' not in offered
-        assert robot.change(publish_twist=False).successful
-        robot.until(lambda: offers(poses) and len(own()) == len(poses), ('no twists', offered))
-        assert own() == {node.topic(name) for name in poses}
+    def both_transforms():
+        robot.send(SECOND, BOTH, Q)
+        for message in inbox:
+            assert len(message.transforms) == 2
+            found.update({item.child_frame_id: item for item in message.transforms})
+        return len(found) >= 2
+    robot.until(both_transforms, 'transforms')
+    qos = robot.node.get_publishers_info_by_topic('/tf')[0].qos_profile
+    assert (qos.reliability, qos.durability) == (
+        ReliabilityPolicy.RELIABLE, DurabilityPolicy.VOLATILE)
+    for child, (chain, part) in zip(children, CHAINS.values(), strict=True):
+        transform = found[f'x/{child}']
+        assert transform.header.frame_id == 'x/root_link'
+        assert transform.header.stamp.sec == 1
+        np.testing.assert_allclose(
+            pose_matrix(transform.transform), oracle_pose(chain, 'v2_5', Q[part], foot_frame),
+            rtol=0, atol=1e-12)
+    assert robot.change(publish_tf=False, frame_prefix='', foot_frame='dh').successful

@@ -1,4 +1,4 @@
-"""A real robot's walk through the node, in real time, judged by another participant."""
+"""A real robot's walk through the node, at 800 Hz, judged by another participant."""
 
 import time
 
@@ -12,19 +12,22 @@ pytestmark = needs_recorded_walk
 
 STANDING = 80.0  # N; a foot with more than this on it stands
 START = 1_700_000_000 * SECOND
+FASTER = 8  # than the robot walked
 
 
 @pytest.fixture(scope='module')
 def walk():
-    """Play the recording in real time; return it and, by foot, what came out."""
+    """Play the recording; return it and, by foot, what came out."""
     names, times, positions, forces = read_recorded_walk()
     stamps = [START + round(t * 1e9) for t in times]
     with NodeProcess({'foot_frame': 'sole', **LOSSLESS}) as node, Robot(node) as robot:
         robot.connect()
         begin = time.monotonic()
         for t, stamp, row in zip(times, stamps, positions, strict=True):
-            while (left := begin + t - time.monotonic()) > 0:
+            left = begin + t / FASTER - time.monotonic()
+            while left > 0:
                 robot.spin(left)
+                left = begin + t / FASTER - time.monotonic()
             robot.send(stamp, names, row)
         poses = {foot: robot.take(robot.poses[foot], stamps[-1]) for foot in FEET}
     return stamps, positions, forces, poses
@@ -47,12 +50,16 @@ def test_every_pose_is_pinocchios(walk):
                 oracle_pose(chain, 'v2_5', row[part], 'sole'), rtol=0, atol=1e-12)
 
 
+def matrices(poses):
+    return np.array([pose_matrix(message.pose) for message in poses])
+
+
 def test_soles_are_parallel_and_level_while_both_feet_stand(walk):
     _, _, forces, poses = walk
     both = (forces > STANDING).all(axis=1)
     assert both.sum() > 200
-    left, right = (np.array([pose_matrix(message.pose) for message in poses[foot]])[both]
-                   for foot in FEET)
+    left = matrices(poses['left_foot'])[both]
+    right = matrices(poses['right_foot'])[both]
     normals = np.einsum('ij,ij->i', left[:, :3, 2], right[:, :3, 2])
     angle_deg = np.degrees(np.arccos(np.clip(normals, -1, 1)))
     # Of the right sole above the left one, on the floor that the left one is level with.

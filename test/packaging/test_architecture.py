@@ -164,11 +164,11 @@ def functions_that_import(library: str) -> list[str]:
 
 @pytest.mark.parametrize('library', [
     'argcomplete',
-    pytest.param('matplotlib', marks=not_yet),
+    'matplotlib',
     'mpl_toolkits',
     'rclpy',
     'rich',
-    pytest.param('rosbags', marks=not_yet),
+    'rosbags',
     pytest.param('sympy', marks=not_yet),
     'viser',
 ])

@@ -23,30 +23,29 @@ MESSAGES = st.builds(
     st.lists(TEXT.filter(lambda text: '\x00' not in text), max_size=6).map(tuple),
     DOUBLES, DOUBLES, DOUBLES, TEXT.filter(lambda text: '\x00' not in text),
     st.sampled_from('<>'), st.sampled_from((0, 1, 4, 9)), st.sampled_from((0, 1, 255)))
-LARGE = Message(7, 8, tuple(f'joint_{i}' for i in range(5000)), tuple(map(float, range(5000))),
-                tuple(map(float, range(4999))), (math.nan,) * 3)
+LARGE = Message(7, 8, tuple(f'joint_{i}' for i in range(2000)), tuple(map(float, range(2000))),
+                tuple(map(float, range(1999))), (math.nan,) * 3)
 GOOD = Message(1, 2, ('a', '', 'längs'), (1.0, 2.0, 3.0), (4.0,), (5.0, 6.0), 'base')
 
 
 def fields(data):
     """Return what was decoded, with floats as bytes, or None if it was refused."""
     try:
-        message = decode_joint_state(data)
+        return meant(decode_joint_state(data))
     except MalformedMessageError:
         return None
-    return (message.sec, message.nanosec, message.names, bits(message.positions),
-            bits(message.velocities))
 
 
 def meant(message):
-    return (message.sec, message.nanosec, message.names, bits(message.positions),
-            bits(message.velocities))
+    return (message.sec, message.nanosec, message.frame_id, message.names,
+            bits(message.positions), bits(message.velocities))
 
 
 def fields_of(ros):
     """Return the same of a message object of rclpy or rosbags."""
-    return (ros.header.stamp.sec, ros.header.stamp.nanosec, tuple(ros.name), bits(ros.position),
-            bits(ros.velocity))
+    header = ros.header
+    return (header.stamp.sec, header.stamp.nanosec, header.frame_id, tuple(ros.name),
+            bits(ros.position), bits(ros.velocity))
 
 
 @pytest.fixture(scope='module')
@@ -64,7 +63,7 @@ def rclpy_reads():
     return read
 
 
-@settings(max_examples=300)
+@settings(max_examples=200)
 @given(MESSAGES)
 @example(LARGE)
 def test_reads_what_rclpy_reads(rclpy_reads, message):
@@ -72,16 +71,16 @@ def test_reads_what_rclpy_reads(rclpy_reads, message):
     assert fields(data) == rclpy_reads(data) == meant(message)
 
 
-@settings(max_examples=300)
-@given(MESSAGES, TEXT)
-@example(LARGE, '')
-def test_reads_what_rclpy_writes(message, frame_id):
+@settings(max_examples=200)
+@given(MESSAGES)
+@example(LARGE)
+def test_reads_what_rclpy_writes(message):
     serialization = pytest.importorskip('rclpy.serialization', reason='needs rclpy')
     joint_state = pytest.importorskip('sensor_msgs.msg', reason='needs sensor_msgs').JointState
     ros = joint_state(name=message.names, position=message.positions,
                       velocity=message.velocities, effort=message.efforts)
     ros.header.stamp.sec, ros.header.stamp.nanosec = message.sec, message.nanosec
-    ros.header.frame_id = frame_id  # cut by rclpy at a NUL
+    ros.header.frame_id = message.frame_id
     assert fields(serialization.serialize_message(ros)) == meant(message)
 
 
@@ -125,7 +124,7 @@ def test_reads_a_string_of_no_bytes_as_empty(rclpy_reads):
 def test_reads_names_that_are_no_utf_8_as_rclpy_does(rclpy_reads):
     data = GOOD.cdr().replace('längs'.encode(), b'l\xff\xfengs'[:6].ljust(6, b'\xc3'))
     assert fields(data) == rclpy_reads(data)
-    assert '\ufffd' in fields(data)[2][2]
+    assert '\ufffd' in fields(data)[3][2]
 
 
 @pytest.mark.parametrize('count', [2**32 - 1, 2**31, 2**31 - 1, 2**29, 2**28, 2**20])
@@ -154,7 +153,7 @@ SPOILS = st.lists(st.tuples(st.integers(0, LONGEST), st.one_of(
     st.sampled_from((0, 1, 2, 4, 8, 0xff)), st.integers(0, 255))), max_size=3)
 
 
-@settings(max_examples=2000)
+@settings(max_examples=1000)
 @given(st.sampled_from(SOUND), SPOILS, st.one_of(st.none(), st.integers(0, LONGEST)))
 def test_spoilt_bytes_are_read_as_rclpy_reads_them_or_refused(rclpy_reads, sound, spoils, end):
     """Whatever passes here passes there, with the same content; what does not is on the list.

@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from typing import NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
@@ -150,6 +151,15 @@ def nanoseconds(stamp):
     return stamp.sec * SECOND + stamp.nanosec
 
 
+class Status(NamedTuple):
+    """What diagnostics say of a chain."""
+
+    level: bytes
+    message: str
+    hardware_id: str
+    values: dict[str, str]
+
+
 class Robot:
     """A participant that publishes joint states and collects what the node publishes.
 
@@ -171,6 +181,7 @@ class Robot:
         self.joints = self.node.create_publisher(JointState, 'joint_states', DEEP)
         self.poses = {tip: self.listen(PoseStamped, f'{name}/{tip}/pose') for tip in tips}
         self.left, self.right = (self.poses.get(tip) for tip in FEET)
+        self.diagnostics = self.listen(DiagnosticArray, '/diagnostics')
         self._parameters = None
 
     def __enter__(self):
@@ -211,13 +222,15 @@ class Robot:
         inboxes = list(self.poses.values()) if inboxes is None else inboxes
         stamp = start
         deadline = time.monotonic() + DEADLINE
-        while not all(stamp in inbox.stamps()[-1:] for inbox in inboxes):
+
+        def is_answered():
+            return all(stamp in inbox.stamps()[-1:] for inbox in inboxes)
+        while not is_answered():
             assert time.monotonic() < deadline, 'the node does not answer'
             stamp += 1000
             self.send(stamp, names, publisher=publisher)
             again = time.monotonic() + 0.1
-            while time.monotonic() < again and not all(
-                    stamp in inbox.stamps()[-1:] for inbox in inboxes):
+            while time.monotonic() < again and not is_answered():
                 self.spin(0.02)
         for inbox in self.poses.values():
             inbox.clear()
@@ -253,33 +266,37 @@ class Robot:
                    for name, value in values.items()]
         return self.result(self.parameters().set_parameters_atomically(changes)).result
 
-    def diagnostics(self):
-        """Return an inbox of /diagnostics."""
-        return self.listen(DiagnosticArray, '/diagnostics')
-
-    def status(self, inbox, chain, condition, meanwhile=lambda: None):
-        """Wait for a status of a chain that meets a condition; return it and its values.
+    def statuses(self, condition, meanwhile=lambda: None):
+        """Wait for diagnostics of the node that meet a condition; return its statuses by chain.
 
         Args:
-            inbox: inbox of /diagnostics.
-            chain: name of the chain.
-            condition: function of the status and its dictionary of values.
+            condition: function of the statuses by chain.
             meanwhile: called every 10 ms while waiting, such as to send joint states.
         """
-        found, seen, due = [], [], [0.0]
+        self.diagnostics.clear()
+        seen = []
+        due = [0.0]
 
-        def arrived():
-            if time.monotonic() >= due[0]:
+        def have_come():
+            if time.monotonic() > due[0]:
                 due[0] = time.monotonic() + 0.01
                 meanwhile()
-            for array in inbox:
-                for status in array.status:
-                    values = {item.key: item.value for item in status.values}
-                    if status.name == f'{self._name_in_status}: {chain}':
-                        seen[:] = [(status.level, status.message, values)]
-                        if condition(status, values):
-                            found.append((status, values))
-            inbox.clear()
-            return bool(found)
-        self.until(arrived, seen)
-        return found[0]
+            for array in self.diagnostics:
+                statuses = self._statuses_in(array)
+                if statuses:
+                    seen.append(statuses)
+                if statuses and condition(statuses):
+                    return True
+            self.diagnostics.clear()
+            return False
+        self.until(have_come, seen)
+        return seen[-1]
+
+    def _statuses_in(self, array):
+        statuses = {}
+        for status in array.status:
+            node, _, chain = status.name.partition(': ')
+            if node == self._name_in_status:
+                values = {item.key: item.value for item in status.values}
+                statuses[chain] = Status(status.level, status.message, status.hardware_id, values)
+        return statuses

@@ -1,0 +1,310 @@
+"""The node's health: one look a second, shown twice, in diagnostics and in the log."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+import time
+from typing import Any, NamedTuple
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from icub_leg_fk.node.outputs import pose_topic
+from icub_leg_fk.stream.joint_input import ChainLook, JointInput, Look, REJECTIONS, TIME_JUMP
+from icub_leg_fk.stream.notes import INFO, listed, Note, notes_of, WARNING
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+
+JOINT_STATE = 'sensor_msgs/msg/JointState'
+PATIENCE = 5  # looks that some notes must last before they are logged
+
+_PERIOD = 1.0  # s from look to look
+_THROTTLE = 5.0  # s between two lines in the log for one reason
+_PATIENT = ('silence', 'no_match', 'always_empty', 'no_clock', 'same_name')
+_THROTTLED = ('malformed', 'position_length', 'duplicate_name', 'missing_joint', 'stale_joint',
+              'non_finite', 'no_velocity')
+_NOT_LOGGED = ('out_of_range',)
+
+
+class Surroundings(NamedTuple):
+    """What is around the node at a look.
+
+    Attributes:
+        topic: full name of the topic the joint states come from.
+        publishers: full names of the nodes that publish joint states on it.
+        other_types: what else is published on it.
+        silence: time since the last message, or since the start [s].
+        has_time: whether the node's clock runs; simulated time may not have begun.
+        name: full name of the node.
+        pose_publishers: full names of the nodes that publish on its first topic.
+    """
+
+    topic: str
+    publishers: Sequence[str]
+    other_types: Sequence[str]
+    silence: float
+    has_time: bool
+    name: str
+    pose_publishers: Sequence[str]
+
+    def publisher_count(self) -> str:
+        """Return how many publishers the topic has, in words."""
+        count = len(self.publishers)
+        if count == 0 and self.other_types:
+            return f'no publisher of this type, only of {", ".join(self.other_types)}'
+        return f'{count or "no"} publisher{"s" * (count > 1)}'
+
+
+@dataclass
+class Totals:
+    """What has happened since the start.
+
+    Attributes:
+        messages: messages received.
+        rejected: messages rejected, by reason.
+        ready: joint vectors that went out, by chain.
+        held_back: messages that gave no pose or twist, by chain and reason.
+    """
+
+    messages: int = 0
+    rejected: Counter[str] = field(default_factory=Counter)
+    ready: Counter[str] = field(default_factory=Counter)
+    held_back: dict[str, Counter[str]] = field(default_factory=dict)
+
+    def add(self, look: Look) -> None:
+        """Add what has happened since the last look."""
+        self.messages += look.messages
+        self.rejected.update(look.rejected)
+        for name, chain_look in look.chains.items():
+            self.ready[name] += chain_look.ready
+            self.held_back.setdefault(name, Counter()).update(chain_look.held_back)
+
+    def values(self, chain: str) -> dict[str, int]:
+        """Return what diagnostics show of a chain."""
+        values = {'messages': self.messages, 'poses': self.ready[chain]}
+        for reason in (*REJECTIONS, TIME_JUMP):
+            values[reason] = self.rejected[reason]
+        return values | dict(sorted(self.held_back[chain].items()))
+
+
+class Health:
+    """Takes a look at the joint input once a second, on the steady clock, and shows what it finds.
+
+    Args:
+        node: the node to speak for.
+        joint_input: the joint input.
+        topic: full name of the topic the joint states come from.
+    """
+
+    def __init__(self, node: Node, joint_input: JointInput, topic: str) -> None:
+        self._node = node
+        self._input = joint_input
+        self._topic = topic
+        self._log = HealthLog(node.get_logger())
+        self._totals = Totals()
+        self._announcement: Sequence[Note] = ()
+        self._announced: Sequence[Note] = ()
+        self._last_look = self._last_message = time.monotonic()
+        self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self._timer = node.create_timer(_PERIOD, self._show,
+                                        clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def announce(self, notes: Sequence[Note]) -> None:
+        """Take what there is to say of the configuration; the next look says it.
+
+        `ros2 param load` sets one parameter after the other.
+        """
+        self._announcement = notes
+
+    def say_announcement(self) -> None:
+        """Say what is new of the configuration."""
+        for note in self._announcement:
+            if note not in self._announced:
+                self._log.write(note)
+        self._announced = self._announcement
+
+    def _show(self) -> None:
+        """Look at what has happened since the last look, and show it."""
+        self.say_announcement()
+        look = self._input.take_look()
+        now = time.monotonic()
+        period, self._last_look = now - self._last_look, now
+        if look.messages:
+            self._last_message = now
+        around = self._surroundings(silence=now - self._last_message)
+        notes = notes_around(look, around, self._totals) + notes_of(look, self._topic)
+        self._totals.add(look)
+        self._log.show(notes, look)
+        array = DiagnosticArray()
+        array.header.stamp = self._node.get_clock().now().to_msg()
+        for chain_look in look.chains.values():
+            status = self._status(look, chain_look, notes)
+            status.values = self._values(chain_look, period, around)
+            array.status.append(status)
+        self._publisher.publish(array)
+
+    def _surroundings(self, silence: float) -> Surroundings:
+        """Return what is around the node."""
+        node = self._node
+        publishers, other_types = [], []
+        for info in node.get_publishers_info_by_topic(self._topic):
+            if info.topic_type == JOINT_STATE:
+                publishers.append(_full_name(info))
+            else:
+                other_types.append(info.topic_type)
+        own_topic = node.resolve_topic_name(pose_topic(self._input.chains[0]))
+        pose_publishers = node.get_publishers_info_by_topic(own_topic)
+        return Surroundings(
+            topic=self._topic,
+            publishers=sorted(publishers),
+            other_types=sorted(other_types),
+            silence=silence,
+            has_time=node.get_clock().now().nanoseconds > 0,
+            name=node.get_fully_qualified_name(),
+            pose_publishers=[_full_name(info) for info in pose_publishers])
+
+    def _status(self, look: Look, chain_look: ChainLook, notes: Sequence[Note]
+                ) -> DiagnosticStatus:
+        """Return the status of a chain, without values."""
+        chain = chain_look.chain
+        name = self._node.get_fully_qualified_name().lstrip('/')
+        level, message = verdict(look, chain_look, notes)
+        return DiagnosticStatus(
+            level=level,
+            name=f'{name}: {chain.name}',
+            message=message,
+            hardware_id=f'{chain.name}={chain.version}')
+
+    def _values(self, chain_look: ChainLook, period: float, around: Surroundings
+                ) -> list[KeyValue]:
+        """Return the values of a chain's status."""
+        chain = chain_look.chain
+        stamps = self._input.held_stamps(chain).values()
+        now = self._node.get_clock().now().nanoseconds
+        values = {
+            'version': chain.version,
+            'rate (Hz)': f'{chain_look.ready / period:.1f}',
+            'age (s)': f'{(now - max(stamps)) / 1e9:.3f}' if stamps else '',
+            'topic': self._topic,
+            'publishers': len(around.publishers),
+            **self._totals.values(chain.name),
+        }
+        for reason, joints in sorted(chain_look.joints.items()):
+            values[f'{reason} joints'] = listed(reason, joints)
+        return [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+
+
+class HealthLog:
+    """Logs each note once, and again only after it has been well in between.
+
+    Rejected messages and those that give no pose are logged every five seconds as long as there
+    are any. A step back in time is an event of its own, and logged each time.
+
+    Args:
+        logger: what logs, such as that of a node.
+    """
+
+    def __init__(self, logger: Any) -> None:
+        self._logger = logger
+        self._throttled = {key: logger.get_child(key) for key in _THROTTLED}
+        self._looks: Counter[tuple[str, str]] = Counter()  # for which a note has lasted
+
+    def show(self, notes: Sequence[Note], look: Look) -> None:
+        """Log what is worth it of the notes of a look."""
+        for note in notes:
+            self._looks[note.key, note.chain] += 1
+            if self._is_due(note):
+                self.write(note)
+        for key, logger in self._throttled.items():
+            texts = [str(note) for note in notes if note.key == key]
+            if texts:
+                logger.warning('; '.join(texts), throttle_duration_sec=_THROTTLE)
+        if look.messages:  # else nothing is known
+            lasting = {(note.key, note.chain) for note in notes}
+            self._looks = Counter({key: self._looks[key] for key in lasting})
+
+    def write(self, note: Note) -> None:
+        """Log a note."""
+        if note.level == INFO:
+            self._logger.info(str(note))
+        else:
+            self._logger.warning(str(note))
+
+    def _is_due(self, note: Note) -> bool:
+        if note.key in _NOT_LOGGED or note.key in _THROTTLED:
+            return False
+        if note.key == TIME_JUMP:
+            return True
+        return self._looks[note.key, note.chain] == (PATIENCE if note.key in _PATIENT else 1)
+
+
+def notes_around(look: Look, around: Surroundings, before: Totals) -> list[Note]:
+    """Return what there is to say of the node's surroundings.
+
+    Args:
+        look: what has happened since the last look.
+        around: what is around the node.
+        before: what had happened until then.
+    """
+    return [
+        *_of_silence(look, around, before),
+        *_of_the_start(look, around, before),
+        *_of_publishers(look, around),
+        *_of_clock_and_name(around),
+    ]
+
+
+def verdict(look: Look, chain_look: ChainLook, notes: Sequence[Note]) -> tuple[bytes, str]:
+    """Return level and message of a chain's status."""
+    concerned = ('', chain_look.chain.name)
+    warnings = [note for note in notes if note.level == WARNING and note.chain in concerned]
+    message = '; '.join(note.text for note in warnings)
+    if look.messages == 0:
+        return DiagnosticStatus.STALE, message
+    if chain_look.ready == 0:
+        return DiagnosticStatus.ERROR, message or 'no message with a position of its joints'
+    if message:
+        return DiagnosticStatus.WARN, message
+    return DiagnosticStatus.OK, 'publishing'
+
+
+def _of_silence(look: Look, around: Surroundings, before: Totals) -> Iterator[Note]:
+    if look.messages == 0:
+        counted = f', {before.messages} before' if before.messages else ''
+        yield Note('silence', '', WARNING,
+                   f'no JointState received on {around.topic} for {around.silence:.0f} s{counted}'
+                   f'; it has {around.publisher_count()}')
+
+
+def _of_the_start(look: Look, around: Surroundings, before: Totals) -> Iterator[Note]:
+    for name, chain_look in look.chains.items():
+        if chain_look.ready and not before.ready[name]:
+            yield Note(f'first pose of {name}', '', INFO,
+                       f'first pose of {chain_look.chain.tip}; {around.publisher_count()} on '
+                       f'{around.topic}')
+
+
+def _of_publishers(look: Look, around: Surroundings) -> Iterator[Note]:
+    """Warn if two publishers seem to bring the joints of one chain."""
+    if look.messages < 2 or len(around.publishers) < 2:
+        return
+    yield Note('publishers', '', INFO, f'{around.publisher_count()} on {around.topic}')
+    for name, chain_look in look.chains.items():
+        if chain_look.ready + chain_look.silent == look.messages:
+            yield Note('same_joints', name, WARNING,
+                       f'every message on {around.topic} brings its joints, and it has '
+                       f'{around.publisher_count()}: {", ".join(around.publishers)}')
+
+
+def _of_clock_and_name(around: Surroundings) -> Iterator[Note]:
+    if not around.has_time:
+        yield Note('no_clock', '', WARNING, 'use_sim_time is set, but no time has come on /clock')
+    if around.pose_publishers.count(around.name) > 1:
+        yield Note('same_name', '', WARNING,
+                   f'another node is called {around.name} and publishes the same topics; give one '
+                   'of them another name: --ros-args -r __node:=NAME')
+
+
+def _full_name(info: Any) -> str:
+    """Return the full name of the node that an endpoint belongs to."""
+    return f'{info.node_namespace.rstrip("/")}/{info.node_name}'

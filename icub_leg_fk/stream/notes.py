@@ -1,0 +1,161 @@
+"""What there is to say of a joint input, as plain data: free of rclpy, and of how it is shown.
+
+The node shows it once a second, in diagnostics and log; a command at the end of a recording.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+import math
+import re
+from typing import NamedTuple
+
+from icub_leg_fk.stream.joint_input import ChainLook, Look, TIME_JUMP
+
+INFO = 'info'
+WARNING = 'warning'
+
+_NAMES_SHOWN = 12
+_LONGEST_SHOWN = 40  # characters of a name
+_MANY_JUMPS = 3
+_LOOP = 20  # messages at least in a recording that is played again and again
+_FORMATS = {
+    'missing_joint': 'never seen',
+    'stale_joint': '{:.3f} s old',
+    'non_finite': '{}',
+    'no_velocity': '{}',
+    'out_of_range': '{:.6g}',
+    'looks_like_degrees': '{:.6g}',
+}
+"""How what was found of a joint is written, by reason."""
+
+
+class Note(NamedTuple):
+    """One thing that is worth a line.
+
+    Attributes:
+        key: what it is about, such as `stale_joint`: the same as long as it lasts.
+        chain: name of the chain that it is about; empty if it is about all messages.
+        level: INFO or WARNING.
+        text: what there is to say, in a line that does not name the chain.
+    """
+
+    key: str
+    chain: str
+    level: str
+    text: str
+
+    def __str__(self) -> str:
+        return f'{self.chain}: {self.text}' if self.chain else self.text
+
+
+def notes_of(look: Look, topic: str = '') -> list[Note]:
+    """Return what there is to say of what happened since the last look.
+
+    Args:
+        look: what happened.
+        topic: the topic on which the messages came; empty if they came otherwise.
+    """
+    on_topic = f' on {topic}' if topic else ''
+    texts = dict(_of_messages(look, on_topic))
+    notes = [Note(key, '', WARNING, texts[key]) for key in texts]
+    for name, chain_look in look.chains.items():
+        texts = dict(_of_chain(chain_look))
+        texts.update(_of_frame_ids(look, chain_look))
+        texts.update(_of_names(look, chain_look, on_topic))
+        notes += [Note(key, name, WARNING, texts[key]) for key in texts]
+    return notes
+
+
+def names_that_came(look: Look) -> str:
+    """Return the joint names that came, as many as fit a line."""
+    names = [repr(name)[1:-1][:_LONGEST_SHOWN] for name in look.names]
+    if len(names) > _NAMES_SHOWN:
+        names[_NAMES_SHOWN:] = ['...']
+    return ', '.join(names) or 'none'
+
+
+def listed(reason: str, joints: Mapping[str, float]) -> str:
+    """Return the joints that a reason concerns, with what was found of each."""
+    words = []
+    for joint, value in joints.items():
+        found = _FORMATS[reason].format(value)
+        if reason == 'no_velocity' and math.isnan(value):
+            found = 'unknown'
+        words.append(f'{joint} {found}')
+    return ', '.join(words)
+
+
+def _of_messages(look: Look, on_topic: str) -> Iterator[tuple[str, str]]:
+    """Yield keys and texts of what there is to say of all messages."""
+    for reason in ('malformed', 'position_length', 'duplicate_name'):
+        count = look.rejected[reason]
+        if count:
+            yield reason, f'{_messages(count)} rejected: {look.faults[reason]}'
+    if look.messages and look.rejected['empty_position'] == look.messages:
+        yield 'always_empty', f'no message{on_topic} has positions: position is empty'
+    jumps = look.rejected[TIME_JUMP]
+    where = look.faults.get(TIME_JUMP)
+    if jumps >= _MANY_JUMPS and jumps * _LOOP > look.messages:
+        yield 'many_time_jumps', (
+            f'time stepped back {jumps} times in {look.messages} messages, last to {where}: do '
+            'several publishers bring the same joints?')
+    elif jumps:
+        times = f' {jumps} times, last' if jumps > 1 else ''
+        yield TIME_JUMP, f'time stepped back{times} to {where}; held joints are forgotten'
+
+
+def _of_chain(look: ChainLook) -> Iterator[tuple[str, str]]:
+    """Yield keys and texts of what there is to say of a chain's joints."""
+    for reason, joints in look.joints.items():
+        words = listed(reason, joints)
+        messages = _messages(look.held_back[reason])
+        if reason == 'out_of_range':
+            yield reason, f'out of range: {words}'
+        elif reason == 'looks_like_degrees':
+            yield reason, f'positions look like degrees, radians are expected: {words}'
+        elif reason == 'no_velocity':
+            yield reason, f'no twist from {messages}: velocity of {words}'
+        else:
+            yield reason, f'no pose from {messages}: {words}'
+
+
+def _of_frame_ids(look: Look, chain_look: ChainLook) -> Iterator[tuple[str, str]]:
+    """Yield a warning of a joint that comes under several frame ids."""
+    for joint in chain_look.chain.joint_names:
+        frame_ids = [repr(name) for name, joints in look.frame_ids.items() if joint in joints]
+        if len(frame_ids) > 1:
+            yield 'frame_ids', (
+                f'{joint} comes under the frame ids {" and ".join(frame_ids)}: from '
+                f'{len(frame_ids)} robots?')
+            return
+
+
+def _of_names(look: Look, chain_look: ChainLook, on_topic: str) -> Iterator[tuple[str, str]]:
+    """Yield a warning if no joint of a chain has come."""
+    joints = chain_look.chain.joint_names
+    if not look.names or not look.joints.isdisjoint(joints):
+        return
+    pair = _near(joints, look.names)
+    hint = ''
+    if pair:
+        hint = f'; {pair[0]!r} is nearly {pair[1]!r}, but names must be equal'
+    yield 'no_match', (
+        f'no message{on_topic} has one of its joints ({", ".join(joints)}); names that came: '
+        f'{names_that_came(look)}{hint}')
+
+
+def _near(joints: Sequence[str], names: Iterable[str]) -> tuple[str, str] | None:
+    """Return the first name that is a joint's but for capitals and what is put before or after."""
+    by_lower = {joint.lower(): joint for joint in joints}
+    any_joint = '|'.join(map(re.escape, by_lower))
+    pattern = re.compile(rf'(?:.*[^a-z0-9])?({any_joint})(?:[^a-z0-9].*)?', re.DOTALL)
+    for name in names:
+        match = pattern.fullmatch(name.lower())
+        if match:
+            return name, by_lower[match[1]]
+    return None
+
+
+def _messages(count: int) -> str:
+    return f'{count} message{"s" * (count != 1)}'

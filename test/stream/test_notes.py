@@ -1,0 +1,141 @@
+"""Notes: what there is to say of messages, joints and names."""
+
+import math
+
+from icub_leg_fk.stream.notes import notes_of
+import pytest
+from support.leg_input import BOTH, LEFT, LegInput, RIGHT
+
+STANDING = [0.0] * 12
+
+
+@pytest.fixture
+def robot():
+    return LegInput(velocities=False)
+
+
+def lines(robot):
+    return [str(note) for note in notes_of(robot.take_look(), '/joint_states')]
+
+
+def test_of_a_healthy_robot_there_is_nothing_to_say(robot):
+    assert lines(robot) == []
+    for ms in range(9):
+        robot.send(ms)
+    assert lines(robot) == []
+
+
+@pytest.mark.parametrize(('names', 'positions', 'fault'), [
+    (BOTH, [0.3, *STANDING], 'position has 13 values for 12 names'),
+    (BOTH, STANDING[1:], 'position has 11 values for 12 names'),
+    ((*BOTH, 'l_knee'), [0.0, *STANDING], "name 'l_knee' appears twice")])
+def test_rejected_messages(robot, names, positions, fault):
+    robot.send(0)
+    robot.send(1, names, positions)
+    assert lines(robot) == [f'1 message rejected: {fault}']
+    robot.send(2, names, positions)
+    robot.send(3, names, positions)
+    assert lines(robot) == [f'2 messages rejected: {fault}']
+
+
+def test_malformed_messages(robot):
+    robot.feed(b'\x00\x01\x00\x00')
+    assert lines(robot) == [
+        '1 message rejected: JointState: header.stamp ends at byte 12; allowed: 4']
+
+
+def test_empty_positions_only_if_nothing_else_comes(robot):
+    robot.send(0, BOTH, [])
+    assert lines(robot) == ['no message on /joint_states has positions: position is empty']
+    robot.send(1, BOTH, [])
+    robot.send(2)
+    assert lines(robot) == []
+
+
+def test_joints_that_hold_a_chain_back(robot):
+    robot.send(0, RIGHT[:5])
+    robot.send(0, RIGHT[:5])
+    assert 'right_leg: no pose from 2 messages: r_ankle_roll never seen' in lines(robot)
+    robot.send(1)
+    robot.send(1002, (*LEFT[1:], *RIGHT))
+    robot.send(1003, BOTH, [math.nan] + [0.0] * 11)
+    assert lines(robot) == [
+        'left_leg: no pose from 1 message: l_hip_pitch 1.001 s old',
+        'left_leg: no pose from 1 message: l_hip_pitch nan']
+
+
+def test_velocities_that_are_wanted_and_do_not_come():
+    robot = LegInput()
+    robot.send(0, LEFT, STANDING[:6], [0.1] * 5 + [math.inf])
+    robot.send(1, RIGHT)
+    unknown = ', '.join(f'{joint} unknown' for joint in RIGHT)
+    assert lines(robot) == [
+        'left_leg: no twist from 1 message: velocity of l_ankle_roll inf',
+        f'right_leg: no twist from 1 message: velocity of {unknown}']
+
+
+def test_degrees_and_joints_out_of_range(robot):
+    robot.send(0, BOTH, [0.0] * 3 + [-45.0, 0.0, 0.6] + [0.0] * 6)
+    assert lines(robot) == [
+        'left_leg: positions look like degrees, radians are expected: l_knee -45',
+        'left_leg: out of range: l_knee -45, l_ankle_roll 0.6']
+
+
+def test_a_loop_is_told_from_publishers_that_contradict_each_other(robot):
+    def loop(times):
+        for ms in [*range(100)] * times:
+            robot.send(ms)
+    loop(1)
+    assert lines(robot) == []
+    for _ in range(2):
+        loop(1)
+        assert lines(robot) == ['time stepped back to 1700000000.000 s; held joints are forgotten']
+    loop(5)
+    assert lines(robot) == [
+        'time stepped back 5 times, last to 1700000000.000 s; held joints are forgotten']
+    for ms in range(100):
+        robot.send(100 + ms)
+        robot.send(99 + ms)
+    assert lines(robot) == [
+        'time stepped back 100 times in 200 messages, last to 1700000000.198 s: do several '
+        'publishers bring the same joints?']
+
+
+@pytest.mark.parametrize(('name', 'is_near'), [
+    ('L_KNEE', True), ('icub/l_knee', True), ('icub::l_knee', True), ('l_knee_joint', True),
+    ('ICUB_L_KNEE', True), ('r_knee', False), ('special_knee', False), ('l_kneecap', False)])
+def test_names_that_match_nothing_with_those_that_are_near(robot, name, is_near):
+    hint = f"; '{name}' is nearly 'l_knee', but names must be equal" if is_near else ''
+    robot.send(0, ('wheel', name, *RIGHT[4:]))
+    assert lines(robot)[0] == (
+        f'left_leg: no message on /joint_states has one of its joints ({", ".join(LEFT)}); names '
+        f'that came: wheel, {name}, r_ankle_pitch, r_ankle_roll{hint}')
+
+
+def test_many_long_names_fit_a_line(robot):
+    robot.send(0, [f'{i}{"x" * 9999}' for i in range(2000)])
+    for line in lines(robot):
+        assert len(line) < 1000
+        assert line.endswith('x, ...')
+
+
+def test_a_joint_that_came_in_any_message_is_not_missed(robot):
+    robot.send(0, ['wheel'])
+    robot.send(1, BOTH, [])
+    assert lines(robot) == []
+
+
+def test_joints_of_one_name_from_two_robots(robot):
+    """As `mk.py two_robots` of the cases beside the project has it."""
+    for ms in range(4):
+        robot.send(ms, frame_id=f'robot{ms % 2 + 1}/base')
+    for line, side in zip(lines(robot), ('left', 'right'), strict=True):
+        assert line == (f'{side}_leg: {side[0]}_hip_pitch comes under the frame ids '
+                        "'robot1/base' and 'robot2/base': from 2 robots?")
+
+
+def test_two_frame_ids_of_different_joints_are_no_conflict(robot):
+    robot.send(0, LEFT, frame_id='left')
+    robot.send(0, RIGHT, frame_id='right')
+    robot.send(0, ['wheel'], frame_id='base')
+    assert lines(robot) == []
