@@ -28,7 +28,7 @@ _UNLIKELY = 100.0  # m
 _NO_RANGE = (-math.inf, math.inf)
 _FOUR_DECIMALS = 2e-4  # what rounding to four decimals may do to R R^T
 _EXACT = 1e-9  # below it a rotation was written with all its digits
-_MOST_ROWS = 50_000  # aliases can make a small file say very much
+_MOST_ROWS = 10_000  # aliases can make a small file say very much
 
 _PLACE = ('root_frame', 'joints', 'tip_frames')
 _REPLACEABLE = (*_PLACE, 'root_axes')
@@ -291,6 +291,9 @@ class _Reader:
             return angle
         value = at.number(f'{self._angle}, or as in pi/2')
         if self._angle == 'deg':
+            if _is_rounded_fraction_of_pi(at.node.value):
+                self._warn(at, f'{value:g} deg is unlikely, since it is a fraction of pi; the '
+                               'unit of angle is deg')
             return math.radians(value)
         if abs(value) > 2 * math.pi + 1e-3:
             self._warn(at, f'{value:g} rad is unlikely; the unit of angle is rad')
@@ -315,6 +318,16 @@ class _Reader:
 
     def _warn(self, at: Field, text: str) -> None:
         self.warnings.append(f'{at.file}:{at.line}: {at.where}: {text}')
+
+
+def _is_rounded_fraction_of_pi(text: str) -> bool:
+    """Return whether a number is pi/12, or a few times that, as people round radians."""
+    decimals = len(text.partition('.')[2])
+    part = math.pi / 2 if decimals == 2 else math.pi / 12
+    times = round(float(text) / part)
+    if not 2 <= decimals <= 8 or not 0 < abs(times) * part < 6.3:
+        return False
+    return round(times * part, decimals) == float(text)
 
 
 def _given(fields: Mapping[str, Field], name: str, read: Callable[[Field], _Value],

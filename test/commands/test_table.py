@@ -22,7 +22,7 @@ def test_the_file_is_taken_by_every_command_and_comes_back_from_its_urdf(tmp_pat
     made = tmp_path / 'made.urdf'
     file.write_text(ARM)
     done = run_main('table', file, *WORDS, '-o', table)
-    assert 'arm: 3 joints; largest difference from the URDF in 1000 postures: 0.0000 mm' in (
+    assert 'arm (frames: tool): 3 joints; largest difference from the URDF in 1000 postures: ' in (
         done.stdout)
     chain = Catalog.load(table).chain('arm')
     q = ['--radians', '0.1', '0.2', '0.3']
@@ -50,7 +50,7 @@ def test_without_output_the_file_is_printed_and_the_report_is_not_in_it(
     urdf = Urdf.load(file)
     assert max(difference(chain.forward, partial(urdf.forward, 'l0', 'tool'),
                           postures(chain, 100))) < 1e-6
-    assert done.stderr.startswith('arm: 3 joints; largest difference')
+    assert done.stderr.startswith('arm (frames: tool): 3 joints; largest difference')
 
 
 def test_chains_that_share_joints_go_into_one_urdf(tmp_path: Path) -> None:
@@ -88,10 +88,58 @@ def test_names_are_any_text_of_one_line(tmp_path: Path) -> None:
     assert_one_line_complaint(run_main('table', file, *tips), 'cannot be written as a kinematics')
 
 
+ICUBS = Path(__file__).resolve().parents[3] / 'shared' / 'data' / 'urdf'
+
+
+@pytest.mark.skipif(not ICUBS.is_dir(), reason='../shared has the URDFs of iCubs')
+def test_of_an_icub_the_shipped_chains_are_written_tidied_and_their_cost_reported(
+        tmp_path: Path) -> None:
+    table = tmp_path / 'nancy.yaml'
+    done = run_main('table', ICUBS / 'iCubNancy01.urdf', '-o', table)
+    assert done.stdout.startswith(f'{table}: left_leg, right_leg, head_imu\n')
+    leg = Catalog.load(table).chain('left_leg')
+    assert [*leg.tip_frames] == ['dh', 'sole'] and leg.tip == 'left_foot'
+    assert np.degrees([link.offset for link in leg.links]).tolist() == [0, 90, -90, 90, 0, 0]
+    assert 'left_leg (frames: dh, sole): 6 joints; largest difference from the URDF in 1000 ' in (
+        done.stdout)
+    cost = float(done.stdout.split('postures: ')[1].split(' mm')[0])
+    urdf = Urdf.load(ICUBS / 'iCubNancy01.urdf')
+    for frame, link in (('dh', 'l_foot_dh_frame'), ('sole', 'l_sole')):
+        robot_frame = partial(urdf.forward, 'root_link', link)
+        found = difference(leg.with_frame(frame).forward, robot_frame, postures(leg, 1000))
+        assert 0.001 < found.mm < cost + 1e-4
+
+
+def test_of_another_robot_the_tips_are_asked_for(tmp_path: Path) -> None:
+    file = tmp_path / 'arm.urdf'
+    file.write_text(ARM)
+    assert_one_line_complaint(run_main('table', file), 'give --tips, such as tool')
+
+
+def test_rows_that_follow_are_written_and_read(tmp_path: Path) -> None:
+    file, table = tmp_path / 'finger.urdf', tmp_path / 'finger.yaml'
+    mimic = '<mimic joint="j0" multiplier="0.5" offset="0.2"/>'
+    file.write_text(robot([joint(0), joint(1, xyz='0.1 0 0', more=mimic),
+                           joint(2, xyz='0.1 0 0')]))
+    assert run_main('table', file, '--tips', 'l3', '-o', table).returncode == 0
+    chain, urdf = Catalog.load(table).chain('l3'), Urdf.load(file)
+    assert chain.joint_names == ('j0', 'j2') and len(chain.links) == 3
+    assert max(difference(chain.forward, partial(urdf.forward, 'l0', 'l3'),
+                          postures(chain, 100))) < 1e-6
+
+
+def test_a_joint_without_bounds_is_compared_over_a_whole_turn(tmp_path: Path) -> None:
+    file = tmp_path / 'arm.urdf'
+    text = robot([joint(0), joint(1, xyz='0.3 0 0')])
+    file.write_text(text.replace('lower="-2" upper="2" ', ''))
+    done = run_main('table', file, '--tips', 'l2')
+    assert 'range' not in done.stdout and '0.0000 mm' in done.stderr
+
+
 def test_a_bad_urdf_or_name_is_refused_in_one_line(tmp_path: Path) -> None:
     file = tmp_path / 'robot.urdf'
     file.write_text(ARM)
-    for words, complaint in ((('--tips', 'l9'), "unknown link 'l9'"),
+    for words, complaint in ((('--tips', 'l9'), "unknown chain 'l9'; known: tool"),
                              (('--tips', 'tool', 'l3', '--name', 'arm'), '2 different names')):
         done = run_main('table', file, '--root', 'l0', *words)
         assert_one_line_complaint(done, complaint)

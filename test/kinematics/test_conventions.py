@@ -86,7 +86,7 @@ def test_the_models_of_roboticstoolbox_are_computed_exactly(tmp_path: Path) -> N
         file.write_text(as_yaml(model))
         chain = Catalog.load(file).chain('robot')
         allowed = TOLERANCE * largest_length(model)
-        for q in rng.uniform(-3, 3, (20, chain.n)):
+        for q in rng.uniform(-3, 3, (6, chain.n)):
             frames = np.array([T.A for T in model.fkine_all(q)])
             expected = model.fkine(q).A
             assert np.abs(chain.frames(q)[:-1] - frames).max() < allowed, name
@@ -202,6 +202,18 @@ def test_what_can_hardly_be_meant_is_computed_and_reported(arm: Path) -> None:
         load_chain('arm', 'v1', file=arm)
     assert [str(warning.message) for warning in warned] == [rotation, length, angle]
     assert {warning.filename for warning in warned} == {__file__}
+
+
+def test_radians_in_a_file_of_degrees_are_computed_and_reported(tmp_path: Path) -> None:
+    file = tmp_path / 'arm.yaml'
+    own = ARM.replace('angle: rad', 'angle: deg').replace('0.7071', '0.70710678118')
+    own = own.replace('alpha: pi/2, offset: -pi/2', 'alpha: 1.5708, offset: -3.142').replace(
+        'alpha: pi, offset: 3*pi/4', 'alpha: 45.5, offset: -0.78').replace('250', '0.25')
+    file.write_text(own)
+    alpha, offset = Catalog.load(file).warnings
+    assert 'version v1, row 0, field alpha: 1.5708 deg is unlikely, since it is a fracti' in alpha
+    assert 'version v1, row 0, field offset: -3.142 deg is unlikely' in offset
+    assert Catalog.load(file).chain('arm', 'v1').links[0].alpha == np.radians(1.5708)
 
 
 def test_three_decimals_are_too_few_for_a_rotation(arm: Path) -> None:
