@@ -12,21 +12,31 @@ README = Path(__file__).with_name('README.md')
 
 ROS, KILTED = ([f'ros-{release}-{name}' for name in (
     'common-interfaces', 'rclpy', 'rmw-fastrtps-cpp')] for release in ('jazzy', 'kilted'))
-TOOLS = ['argcomplete', 'matplotlib>=3.6', 'rosbags>=0.11.9,<0.12', 'sympy']
+TOOLS = [
+    'argcomplete',
+    'matplotlib>=3.6',
+    'rich',
+    'rosbags>=0.11.9,<0.12',
+    'sympy',
+    'viser>=1.1',
+]
 TEST = [
     'colcon-common-extensions',
+    'cyclonedds>=11,<12',
     'distributed',
     'example-robot-data',
     'hypothesis',
     'icub-models',
     'mcap',
     'pin',
+    'playwright',
     'pytest>=7.4',
     'pytest-xdist',
     'roboticstoolbox-python',
     'setuptools<80',
 ]
 LINT = [
+    'check-jsonschema',
     'flake8',
     'flake8-blind-except',
     'flake8-builtins',
@@ -50,7 +60,6 @@ setup(
     description='Forward kinematics of the iCub legs: joint angles in, foot poses out',
     long_description=README.read_text(encoding='utf-8') if README.is_file() else '',
     long_description_content_type='text/markdown',
-    url='https://icub-tech-iit.github.io/documentation/',
     classifiers=[
         'Development Status :: 4 - Beta',
         'Intended Audience :: Science/Research',
@@ -78,7 +87,7 @@ setup(
         (f'{SHARE}/launch', sorted(glob('launch/*_launch.py'))),
     ],
     python_requires='>=3.10',
-    install_requires=['numpy>=1.26', 'PyYAML>=6.0'],
+    install_requires=['lxml', 'numpy>=1.26', 'PyYAML>=6.0'],
     extras_require={
         'ros': ROS,
         'ros-kilted': KILTED,

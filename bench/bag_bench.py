@@ -25,6 +25,16 @@ _START = 1_700_000_000 * 1_000_000_000  # ns
 _GAIT_MESSAGES = 100
 _OURS = (sys.executable, '-m', 'icub_leg_fk', 'bag')
 _PLAIN = (sys.executable, '-m', 'bench.plain')
+_LABELS = {
+    'ours': 'leg_fk bag',
+    'twists': 'leg_fk bag --twist',
+    'plain': 'plain loop over rosbags'}
+
+
+class _Lengths(NamedTuple):
+    short: int  # s, likewise below
+    long: int
+    jobs: int
 
 
 class _Run(NamedTuple):
@@ -34,35 +44,47 @@ class _Run(NamedTuple):
 
 def measure_bag(report: Report, quick: bool) -> None:
     """Add speed, memory and two jobs."""
-    short, long, jobs_length, rounds = (1, 2, 2, 1) if quick else (10, 90, 120, 3)
-    runs: dict[str, list[_Run]] = {'short': [], 'ours': [], 'plain': [], 'twists': []}
-    jobs: dict[int, list[float]] = {1: [], 2: []}
+    lengths = _Lengths(1, 2, 2) if quick else _Lengths(10, 90, 120)
     with TemporaryDirectory(prefix='bench_bag_') as directory:
-        folder, out = Path(directory), Path(directory) / 'out'
-        bag, small = (_write_bag(folder / f'{length}_s', length) for length in (long, short))
-        pair = [_write_bag(folder / name, jobs_length) for name in ('one', 'two')]
-        for _ in range(rounds):
-            for name, command in {'ours': [*_OURS, bag], 'plain': [*_PLAIN, bag],
-                                  'twists': [*_OURS, '--twist', bag],
-                                  'short': [*_OURS, small]}.items():
-                runs[name].append(_time(command, out, one_core=True))
-            for count, readings in jobs.items():
-                readings.append(_time([*_OURS, *pair, '--jobs', str(count), '--out-dir'],
-                                      out).seconds)
-    seconds = {name: [run.seconds for run in of_name] for name, of_name in runs.items()}
-    report.note(f'\nleg_fk bag, mcap to mcap, one core, start included: {long} s at {_RATE} Hz, '
-                f'{len(ROBOT_JOINTS)} joints, two feet')
-    for name, label in (('ours', 'leg_fk bag'), ('twists', 'leg_fk bag --twist'),
-                        ('plain', 'plain loop over rosbags')):
-        report.row(f'{label}, per message', [s / long / _RATE * 1e6 for s in seconds[name]], 'us')
-    report.row('times real time', [long / s for s in seconds['ours']], 'x')
+        runs, jobs = _run_all(Path(directory), lengths, rounds=1 if quick else 3)
+    seconds = {}
+    for name, of_name in runs.items():
+        seconds[name] = [run.seconds for run in of_name]
+    report.note(f'\nleg_fk bag, mcap to mcap, one core, start included: {lengths.long} s at '
+                f'{_RATE} Hz, {len(ROBOT_JOINTS)} joints, two feet')
+    count = lengths.long * _RATE
+    for name, label in _LABELS.items():
+        report.row(f'{label}, per message', [s / count * 1e6 for s in seconds[name]], 'us')
+    report.row('times real time', [lengths.long / s for s in seconds['ours']], 'x')
     report.row('bag, plain loop / here', ratio(seconds['plain'], seconds['ours']), 'x',
                at_least=3.0)
-    for name, length in (('short', short), ('ours', long)):
-        report.row(f'bag, peak memory, {length} s', [run.peak for run in runs[name]], 'MB',
-                   at_most=80.0)
-    report.row(f'bag, two of {jobs_length} s, --jobs 1 / --jobs 2', ratio(jobs[1], jobs[2]), 'x',
+    for name, length in (('short', lengths.short), ('ours', lengths.long)):
+        peaks = [run.peak for run in runs[name]]
+        report.row(f'bag, peak memory, {length} s', peaks, 'MB', at_most=80.0)
+    report.row(f'bag, two of {lengths.jobs} s, --jobs 1 / --jobs 2', ratio(jobs[1], jobs[2]), 'x',
                at_least=1.6)
+
+
+def _run_all(folder: Path, lengths: _Lengths, rounds: int
+             ) -> tuple[dict[str, list[_Run]], dict[int, list[float]]]:
+    """Return the runs of each way, and the seconds that two bags take by number of jobs."""
+    long = _write_bag(folder / 'long', lengths.long)
+    commands = {
+        'ours': [*_OURS, long],
+        'plain': [*_PLAIN, long],
+        'twists': [*_OURS, '--twist', long],
+        'short': [*_OURS, _write_bag(folder / 'short', lengths.short)]}
+    pair = [_write_bag(folder / name, lengths.jobs) for name in ('one', 'two')]
+    runs: dict[str, list[_Run]] = {name: [] for name in commands}
+    jobs: dict[int, list[float]] = {1: [], 2: []}
+    out = folder / 'out'
+    for _ in range(rounds):
+        for name, command in commands.items():
+            runs[name].append(_time(command, out, one_core=True))
+        for count, readings in jobs.items():
+            command = [*_OURS, *pair, '--jobs', str(count), '--out-dir']
+            readings.append(_time(command, out).seconds)
+    return runs, jobs
 
 
 def _write_bag(path: Path, seconds: int) -> str:

@@ -28,11 +28,13 @@ def foot_matrix(chain: Chain, q: Sequence[float]) -> Array:
     T = chain.T_root_0
     for link, angle in zip(chain.links, q, strict=True):
         theta = link.offset + angle
-        ct, st, ca, sa = (math.cos(theta), math.sin(theta), math.cos(link.alpha),
-                          math.sin(link.alpha))
-        T = T @ np.array([[ct, -st * ca, st * sa, link.a * ct], [st, ct * ca, -ct * sa,
-                                                                 link.a * st],
-                          [0.0, sa, ca, link.d], [0.0, 0.0, 0.0, 1.0]])
+        ct, st = math.cos(theta), math.sin(theta)
+        ca, sa = math.cos(link.alpha), math.sin(link.alpha)
+        T = T @ np.array([
+            [ct, -st * ca, st * sa, link.a * ct],
+            [st, ct * ca, -ct * sa, link.a * st],
+            [0.0, sa, ca, link.d],
+            [0.0, 0.0, 0.0, 1.0]])
     return T
 
 

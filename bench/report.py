@@ -21,16 +21,20 @@ class Report:
     def row(self, name: str, readings: Sequence[float], unit: str, at_most: float | None = None,
             at_least: float | None = None) -> None:
         """Add a row; what is promised is promised of the median."""
-        median, promised = statistics.median(readings), ''
-        for sign, limit, is_kept in (('≤', at_most, at_most is not None and median <= at_most),
-                                     ('≥', at_least, at_least is not None and median >= at_least)):
-            if limit is not None:
-                (self.kept if is_kept else self.missed).append(
-                    f'{name} {median:.3g} ({sign} {limit:g})')
-                promised = f'{sign} {limit:g}'.ljust(9) + 'missed' * (not is_kept)
-        figures = ''.join(f'{value:>10.0f}' if abs(value) >= 1000 else f'{value:>10.3g}'
-                          for value in (median, min(readings), max(readings)))
-        print(f'  {name:50}{figures} {unit:4} {promised}'.rstrip(), flush=True)
+        median = statistics.median(readings)
+        promise = ''
+        if at_most is not None:
+            promise = self._judge(name, median, '≤', at_most, median <= at_most)
+        if at_least is not None:
+            promise = self._judge(name, median, '≥', at_least, median >= at_least)
+        figures = ''.join(map(_figure, (median, min(readings), max(readings))))
+        print(f'  {name:50}{figures} {unit:4} {promise}'.rstrip(), flush=True)
+
+    def _judge(self, name: str, median: float, sign: str, limit: float, is_kept: bool) -> str:
+        """Remember a promise, and return what its row says of it."""
+        promises = self.kept if is_kept else self.missed
+        promises.append(f'{name} {median:.3g} ({sign} {limit:g})')
+        return f'{sign} {limit:g}' if is_kept else f'{sign} {limit:g}'.ljust(9) + 'missed'
 
     def note(self, text: str) -> None:
         """Add a line of text, such as the title of a part."""
@@ -40,6 +44,10 @@ class Report:
         """Return a line on the promises kept and missed."""
         return (f'{len(self.kept)} promises kept: {"; ".join(self.kept) or "none"}. '
                 f'{len(self.missed)} missed{": " * bool(self.missed)}{"; ".join(self.missed)}.')
+
+
+def _figure(value: float) -> str:
+    return f'{value:>10.0f}' if abs(value) >= 1000 else f'{value:>10.3g}'
 
 
 def ratio(ours: Sequence[float], reference: Sequence[float]) -> list[float]:

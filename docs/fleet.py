@@ -1,6 +1,8 @@
 """Add the poses of the feet to a fleet of recordings, on as many machines as Dask has workers.
 
 python docs/fleet.py RECORDINGS OUTPUT [ADDRESS-OF-A-DASK-SCHEDULER]
+
+Exits with status 1 if a recording could not be read.
 """
 
 from pathlib import Path
@@ -12,7 +14,15 @@ from icub_leg_fk.tools.add_poses import add_foot_poses
 if __name__ == '__main__':
     recordings, output, *scheduler = sys.argv[1:]
     sources = sorted(path.parent for path in Path(recordings).glob('*/metadata.yaml'))
+    targets = [Path(output) / source.name for source in sources]
+    Path(output).mkdir(parents=True, exist_ok=True)
+    failed = 0
     with Client(*scheduler) as client:
-        jobs = client.map(add_foot_poses, sources, [Path(output) / s.name for s in sources])
-        for job in jobs:
-            print(job.result() if job.exception() is None else job.exception())
+        for job in client.map(add_foot_poses, sources, targets):
+            if job.exception() is None:
+                print(job.result())
+            else:
+                print(job.exception(), file=sys.stderr)
+                failed += 1
+    if failed:
+        sys.exit(f'{failed} of {len(sources)} recordings failed')

@@ -1,8 +1,5 @@
 """Forward kinematics of the iCub's legs, and of any Denavit-Hartenberg table."""
 
-from importlib import import_module
-from typing import Any, TYPE_CHECKING
-
 from icub_leg_fk.errors import (
     CatalogError,
     InputFileError,
@@ -13,24 +10,19 @@ from icub_leg_fk.errors import (
     OutputFileError,
     ParameterError,
     UnknownNameError,
+    VersionNeededError,
 )
-
-if TYPE_CHECKING:
-    from icub_leg_fk.kinematics import Catalog, Chain, DHLink, load_chain
-
-__version__ = '0.1.0'
-
-_KINEMATICS = ('Catalog', 'Chain', 'DHLink', 'load_chain')
+from icub_leg_fk.kinematics import Catalog, Chain, DHLink, load_chain
+from icub_leg_fk.tools.add_poses import add_foot_poses
 
 __all__ = [
     'Catalog', 'CatalogError', 'Chain', 'DHLink', 'InputFileError', 'JointVectorError',
     'LegFKError', 'MalformedMessageError', 'MissingDependencyError', 'OutputFileError',
-    'ParameterError', 'UnknownNameError', 'load_chain',
+    'ParameterError', 'UnknownNameError', 'VersionNeededError', 'add_foot_poses', 'load_chain',
 ]
 
+__version__ = '0.1.0'
 
-def __getattr__(name: str) -> Any:
-    """Import numpy only when it is needed, which it is not for `leg_fk -h`."""
-    if name in _KINEMATICS:
-        return getattr(import_module('icub_leg_fk.kinematics'), name)
-    raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+
+def __dir__() -> list[str]:
+    return __all__

@@ -2,8 +2,7 @@
 """The `leg_fk` command, also as `python -m icub_leg_fk`: one subcommand per module of `commands`.
 
 A subcommand's module has `EXAMPLES`, `add_arguments(parser)` and `run(args)`. Only that of the
-subcommand asked for is imported; what is optional it imports inside functions, and `pose`, which
-is asked for most, numpy too.
+subcommand asked for is imported.
 """
 
 import argparse
@@ -11,14 +10,12 @@ from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
 import io
-from itertools import takewhile
 import os
-import re
 import sys
-from typing import Any, NoReturn
 
 from icub_leg_fk import __version__
-from icub_leg_fk.errors import closest, LegFKError, UnknownNameError
+from icub_leg_fk.errors import LegFKError, UnknownNameError
+from icub_leg_fk.tools.command_line import Parser
 from icub_leg_fk.tools.signals import stop_on_signals
 
 COMMANDS = {  # and what they are for
@@ -27,10 +24,12 @@ COMMANDS = {  # and what they are for
     'explain': 'explain a chain: DH table, each A_i, products, answer',
     'bag': 'copy a bag and add the poses of the feet, as the node sends them',
     'plot': 'a picture of the feet over time and the legs in space, from a bag or CSV',
+    'view': 'a page in the browser: sliders, poses, the DH method step by step',
     'table': 'make the DH table of any robot from its URDF, as a kinematics file',
     'compare': 'compare a robot, given by its URDF, with the versions of the tables',
     'urdf': 'write chains as a URDF, for RViz, Pinocchio and others',
-    'demo': 'the live demonstration: a walk through the node, poses as they come'}
+    'demo': 'the live demonstration: a walk through the node, poses as they come',
+}
 
 DESCRIPTION = """\
 Joint angles in, foot poses out: forward kinematics of the iCub's legs, and of any
@@ -50,45 +49,15 @@ examples:
 
 `leg_fk COMMAND -h` explains a command and shows more examples."""
 
-_NEGATIVE = re.compile(r'-(inf|nan|(\d+\.?\d*|\.\d+)(e[-+]?\d+)?)(,|$)', re.IGNORECASE)
-
-
-class Parser(argparse.ArgumentParser):
-    """An argument parser that takes every negative number and complains in one line."""
-
-    def __init__(self, **settings: Any) -> None:
-        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter,
-                         allow_abbrev=False, **settings)
-
-    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Parse the arguments; `-1e-3` is a value, which argparse alone takes for an option."""
-        # A word that starts with a space is never an option, and float() ignores the space.
-        args = [f' {word}' if _NEGATIVE.match(word) else word for word in args or ()]
-        return super().parse_known_args(args, namespace)
-
-    def error(self, message: str) -> NoReturn:
-        """Raise the mistake, for `main` to report."""
-        raise LegFKError(f'{message} (see {self.prog} -h)')
-
-    def refuse_unknown_options(self, words: Sequence[str]) -> None:
-        """Name an option that does not exist; argparse would miss a required one instead."""
-        known = self._option_string_actions
-        for word in takewhile('--'.__ne__, words):
-            option = word.partition('=')[0]
-            if (not word.startswith('-') or word == '-' or _NEGATIVE.match(word) or option in known
-                    or (word[:2] in known and not word.startswith('--'))):
-                continue
-            guess = closest(option, known) or next((name for name in known if name[:2] == '--'
-                                                 and len(option) > 3 and option[2:] in name), '')
-            self.error(f'unknown option {option}{f"; did you mean {guess}?" if guess else ""}')
+_INTERRUPTED = 128 + 2  # as a shell reports SIGINT
+_NOBODY_READS = 128 + 13  # as it reports SIGPIPE
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return 0, or 2 after a mistake, which is told in one line on stderr."""
+    """Run the command; return 0, or 2 after a mistake, which is one line on stderr."""
     words = sys.argv[1:] if argv is None else list(argv)
     if '_ARGCOMPLETE' in os.environ:
-        from argcomplete import autocomplete  # which set these variables
-        autocomplete(_parsers(os.environ['COMP_LINE'].split()[1:])[0])
+        _complete(os.environ['COMP_LINE'])
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors='backslashreplace')  # a terminal that is not UTF-8
     try:
@@ -97,15 +66,16 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stdout.flush()
         return status
     except KeyboardInterrupt:
-        return 128 + 2  # as a shell reports SIGINT
+        return _INTERRUPTED
     except BrokenPipeError:
         _forget_output()
-        return 128 + 13  # as it does SIGPIPE
-    except (LegFKError, OSError) as error:
-        print(f'leg_fk: error: {" ".join(str(error).split())}', file=sys.stderr)
-        if isinstance(error, OSError):
-            _forget_output()
-        return 2
+        return _NOBODY_READS
+    except LegFKError as error:
+        _complain(error)
+    except OSError as error:
+        _complain(error)
+        _forget_output()
+    return 2
 
 
 def _run(words: list[str]) -> int:
@@ -118,22 +88,25 @@ def _run(words: list[str]) -> int:
 
 
 def parse(words: list[str]) -> argparse.Namespace:
-    """Return what the words of the command say; `run` is what carries it out."""
+    """Return what the words of the command mean; `run` is what carries it out."""
     parser, parsers = _parsers(words)
-    if words and words[0] in parsers:
-        parsers[words[0]].refuse_unknown_options(words[1:])
-        return parsers[words[0]].parse_intermixed_args(words[1:])  # as in: bag IN --twist OUT
-    if words and not words[0].startswith('-'):
-        raise UnknownNameError('command', words[0], COMMANDS)
-    return parser.parse_args(words or ['-h'])
+    command = words[0] if words else '-h'
+    if command in parsers:
+        parsers[command].refuse_unknown_options(words[1:])
+        return parsers[command].parse_intermixed_args(words[1:])  # as in: bag IN --twist OUT
+    if not command.startswith('-'):
+        raise UnknownNameError('command', command, COMMANDS, 'leg_fk -h explains them')
+    parser.refuse_unknown_options(words)
+    return parser.parse_args([command, *words[1:]])
 
 
 def _parsers(words: Sequence[str]) -> tuple[Parser, dict[str, Parser]]:
     """Return the command's parser, and its subcommands'; only the one asked for has options."""
-    parser = Parser(prog='leg_fk', description=DESCRIPTION, epilog=EXAMPLES)
+    parser = Parser(prog='leg_fk', usage='leg_fk COMMAND ...', description=DESCRIPTION,
+                    epilog=EXAMPLES)
     parser.add_argument('--version', action='version', version=f'leg_fk {__version__}')
     subparsers = parser.add_subparsers(title='commands', metavar='COMMAND', required=True,
-                                       prog='leg_fk')  # argparse would import much to find it
+                                       prog='leg_fk')
     for name, purpose in COMMANDS.items():
         subparser = subparsers.add_parser(name, help=purpose, description=purpose)
         if name in words[:1]:
@@ -142,6 +115,17 @@ def _parsers(words: Sequence[str]) -> tuple[Parser, dict[str, Parser]]:
             module.add_arguments(subparser)
             subparser.set_defaults(run=module.run)
     return parser, subparsers.choices
+
+
+def _complete(line: str) -> None:
+    """Offer the shell what may follow, and end the process."""
+    from argcomplete import autocomplete  # which has had the shell set the variables
+    parser, _ = _parsers(line.split()[1:])
+    autocomplete(parser)
+
+
+def _complain(error: Exception) -> None:
+    print(f'leg_fk: error: {" ".join(str(error).split())}', file=sys.stderr)
 
 
 def _forget_output() -> None:

@@ -1,4 +1,4 @@
-"""Errors of icub_leg_fk: each is named after its fault, carries its data and reads as a sentence."""
+"""Errors of icub_leg_fk: each is named after its fault, carries its data and is a sentence."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches

@@ -1,22 +1,31 @@
 """`leg_fk compare`: which version of the tables a robot is, and how far off, by its URDF."""
 
 import argparse
-from collections.abc import Sequence
-from itertools import permutations, product
-import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+import shlex
+import textwrap
 from typing import Any, NamedTuple
 
 from icub_leg_fk.errors import InputFileError
-from icub_leg_fk.kinematics import Chain, matrix_to_quaternion, Urdf
-from icub_leg_fk.kinematics.rotation import angle_between, Array, turns_about
+from icub_leg_fk.kinematics import Catalog, Chain, Urdf
+from icub_leg_fk.kinematics.difference import (
+    Difference,
+    distance,
+    fit,
+    postures,
+    turn_in_words,
+    turn_of_axes,
+)
+from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.tools import options, text
 import numpy as np
 
 EXAMPLES = """\
 For each chain and version whose joints and frames the URDF has: how far the table's tip is from
-the robot's frame of that name, at random joint positions within +-1.2 rad. "Fitted" is what is
-left after the best constant transforms at root and tip: a frame that is only shifted fits, a
-different leg does not.
+the robot's frame of that name, at random joint positions within +-1.2 rad. "Fit" is what is left
+after the best constant transforms at root and tip: a frame that is only moved or turned fits, a
+different leg does not. The version that fits best is the nearest.
 
 examples:
   leg_fk compare icub.urdf
@@ -25,29 +34,39 @@ examples:
 
 _SAMPLES = 400
 _REACH = 1.2  # rad or m
-_NEAR = 1.0  # mm; so near a table is the robot
+_NEAR = 1.0  # mm or deg; so near a table is the robot
 _USABLE = 10.0  # mm
+_WIDTH = 80
 _FEWEST_JOINTS = 3  # for constants at both ends to be told from the joints
-_ARM = 0.3  # m; weighs angles against lengths in the fit
+_NODE = 'ros2 run icub_leg_fk foot_pose_publisher --ros-args'
+_HEADER = ('chain', 'version', 'frame', 'mm', 'deg', 'fit mm', 'fit deg', '')
+_NUMBERS = range(3, 7)  # the columns of numbers
 
 
-class Difference(NamedTuple):
-    """How far a table is from a robot: largest and mean distance and angle.
+class Comparison(NamedTuple):
+    """A table's tip beside a robot's frame of that name.
 
-    The angle is counted after a pure turn of the tip's axes, which `turn` has in words; what is
-    fitted is after the best constants, and None where the joints are too few to tell.
+    Attributes:
+        chain: the table, in the frame that is compared.
+        direct: how far they are apart, after a pure turn of the tip's axes.
+        turn: that turn, in words; empty if there is none.
+        fitted: how far they are apart after the best constants at both ends; None if the joints
+            are too few to tell.
+        root_turn: how the robot's root frame is turned from the table's, in words; empty if it is
+            not, or if nothing fits.
     """
 
-    chain: str
-    version: str
-    root: str
-    frame: str
-    mm: tuple[float, float]
-    deg: tuple[float, float]
+    chain: Chain
+    direct: Difference
     turn: str
-    fitted_mm: tuple[float, float] | None
-    fitted_deg: tuple[float, float] | None
-    nearest: bool = False
+    fitted: Difference | None
+    root_turn: str
+
+    @property
+    def score(self) -> float:
+        """What is smallest for the version nearest to the robot."""
+        best = self.fitted or self.direct
+        return round(best.mm + 5 * best.deg, 2)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -61,169 +80,212 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the comparison."""
     catalog, urdf = options.load_catalog(args), Urdf.load(args.urdf)
-    for name in args.chains or ():
-        catalog.entry(name)
-    names = args.chains or list(catalog.chains)
-    found = [difference(chain, urdf) for name in names
-             for version, table in catalog.chains[name].versions.items()
-             for frame in table.tip_frames
-             for chain in [catalog.chain(name, version, frame)] if _has(urdf, chain)]
+    found: list[Comparison] = []
+    not_compared = []
+    for name in args.chains or catalog.chains:
+        rows, reason = _compare_chain(catalog, name, urdf)
+        found += rows
+        if not rows:
+            not_compared.append(f'{name}: not compared: {reason}')
     if not found:
-        joints = ', '.join(joint.name for joint in list(urdf.joints.values())[:12])
-        raise InputFileError(f'{args.urdf}: has the joints and frames of no chain of '
-                             f'{", ".join(names)}; its joints are {joints or "none"}')
-    found = [row._replace(nearest=row is _nearest(found, row.chain)) for row in found]
-    advice = [_advice(_nearest(found, name), args.urdf) for name in dict.fromkeys(
-        row.chain for row in found)]
+        raise InputFileError(args.urdf, f'cannot be compared: {"; ".join(not_compared)}')
+    nearest = _nearest_of_each_chain(found)
+    advice = [_summary(row, found) for row in nearest]
+    advice += [*not_compared, *_what_to_run(nearest, urdf, args)]
     if args.json:
+        differences = [_as_json(row, row in nearest) for row in found]
         print(text.as_json({'urdf': args.urdf, 'robot': urdf.name, 'advice': advice,
-                            'differences': [_as_json(row) for row in found]}))
+                            'differences': differences}))
         return 0
-    print(f'{args.urdf} ({urdf.name}) beside the tables of {catalog.file}')
-    print(f'{_SAMPLES} postures within +-{_REACH} rad; largest (mean) difference\n')
-    print('\n'.join(text.columns([_cells(row) for row in found], header=(
-        'chain', 'version', 'frame', 'mm', 'deg', 'fitted mm', 'fitted deg', ''))))
+    print(f'{args.urdf} ({urdf.name}) beside the tables of')
+    print(f'{catalog.file}')
+    print(f'{_SAMPLES} postures within +-{_REACH} rad; largest difference\n')
+    print('\n'.join(_table([_cells(row, row in nearest) for row in found])))
     print()
-    print('\n'.join(advice))
+    for line in advice:
+        is_command = line.startswith('  ')
+        print(line if is_command else textwrap.fill(line, _WIDTH, subsequent_indent='  '))
     return 0
 
 
-def difference(chain: Chain, urdf: Urdf) -> Difference:
-    """Return how far a chain's tip is from the robot's frame of that name."""
-    Q = np.random.default_rng(2955).uniform(-_REACH, _REACH, (_SAMPLES, chain.n))
-    ours = chain.forward(Q)
-    robot = urdf.forward(chain.root_frame, chain.frame_id,
-                         dict(zip(chain.joint_names, Q.T, strict=True)))
-    turn, words = _turn_of_axes(ours, robot)
-    turned = ours @ turn
-    fitted = _fitted(turned, robot) if chain.n >= _FEWEST_JOINTS else None
-    mm, deg = _distance(turned, robot)
-    return Difference(chain.name, chain.version, chain.root_frame, chain.frame_id, mm, deg, words,
-                      *(_distance(fitted, robot) if fitted is not None else (None, None)))
+def _compare_chain(catalog: Catalog, name: str, urdf: Urdf) -> tuple[list[Comparison], str]:
+    """Return the comparisons of a chain's versions, and why there is none if there is none."""
+    rows: list[Comparison] = []
+    reasons: list[str] = []
+    for table in catalog.entry(name).versions.values():
+        frames = []
+        for frame in table.tip_frames:
+            reason = _lacks(urdf, table.with_frame(frame))
+            reasons.append(reason)
+            if not reason:
+                frames.append(frame)
+        rows += compared(table, frames, urdf)
+    return rows, reasons[0]
 
 
-def _has(urdf: Urdf, chain: Chain) -> bool:
-    """Return whether a robot has all joints of a chain between its root and tip frames."""
-    if not {chain.root_frame, chain.frame_id} <= {*urdf.links}:
-        return False
+def compared(table: Chain, frames: Sequence[str], urdf: Urdf) -> list[Comparison]:
+    """Return how far a table is from a robot, for some of its tip frames.
+
+    The constants that fit best are those of the first frame: another frame of the same body only
+    moves them.
+    """
+    rows: list[Comparison] = []
+    positions = postures(table, _SAMPLES, _REACH, whole_range=False)
+    fitted, root_turn, X = None, '', np.eye(4)
+    for frame in frames:
+        chain = table.with_frame(frame)
+        ours = chain.forward(positions)
+        theirs = urdf.forward(chain.root_frame, chain.frame_id,
+                              _for_masters(positions, chain, urdf))
+        if not rows and chain.n >= _FEWEST_JOINTS:
+            X, Y = fit(ours, theirs)
+            fitted = distance(X @ ours @ Y, theirs)
+            root_turn = turn_in_words(X[:3, :3]) if fitted.deg <= _NEAR else ''
+        turn = turn_of_axes(X @ ours if root_turn else ours, theirs)
+        rows.append(Comparison(chain, distance(ours @ turn, theirs),
+                               turn_in_words(turn[:3, :3]), fitted, root_turn))
+    return rows
+
+
+def _for_masters(positions: Mapping[str, Array], chain: Chain, urdf: Urdf) -> dict[str, Array]:
+    """Return positions with those of other joints that move the chain's in the robot."""
+    completed = dict(positions)
+    for joint in urdf.path(chain.root_frame, chain.frame_id):
+        if joint.moves and joint.name in positions and joint.moved_by not in positions:
+            completed[joint.moved_by] = (positions[joint.name] - joint.offset) / joint.gain
+    return completed
+
+
+def _lacks(urdf: Urdf, chain: Chain) -> str:
+    """Return what of a chain a robot lacks; nothing if it can be compared."""
+    for link in (chain.root_frame, chain.frame_id):
+        if link not in urdf.links:
+            return f'the robot has no link {link}'
     try:
         path = urdf.path(chain.root_frame, chain.frame_id)
-    except InputFileError:
-        return False
-    return {*chain.joint_names} <= {joint.name for joint in path}
+    except InputFileError as error:
+        return error.fault
+    on_the_way = {joint.name for joint in path} | {joint.moved_by for joint in path}
+    missing = [name for name in chain.joint_names if name not in on_the_way]
+    if missing:
+        return (f'between {chain.root_frame} and {chain.frame_id} the robot has no joint '
+                f'{", ".join(missing)}')
+    return ''
 
 
-def _nearest(rows: Sequence[Difference], chain: str) -> Difference:
-    return min((row for row in rows if row.chain == chain),
-               key=lambda row: (round(row.mm[0] + 5 * row.deg[0], 2), bool(row.turn)))
+def _nearest_of_each_chain(rows: Sequence[Comparison]) -> list[Comparison]:
+    nearest: dict[str, Comparison] = {}
+    for row in rows:
+        best = nearest.setdefault(row.chain.name, row)
+        if row.score < best.score:
+            nearest[row.chain.name] = row
+    return list(nearest.values())
 
 
-def _distance(one: Array, two: Array) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return largest and mean distance [mm] and angle [deg] between transforms."""
-    off = 1000 * np.linalg.norm(one[:, :3, 3] - two[:, :3, 3], axis=1)
-    angle = np.degrees(angle_between(one[:, :3, :3], two[:, :3, :3]))
-    return ((float(off.max()), float(off.mean())), (float(angle.max()), float(angle.mean())))
+def _summary(row: Comparison, rows: Sequence[Comparison]) -> str:
+    """Return how near a robot's chain is to the nearest version of the tables."""
+    chain, direct, fitted = row.chain, row.direct, row.fitted
+    off = f'{_short(direct.mm)} mm'
+    if direct.deg > 0.1:
+        off += f' and {_short(direct.deg)} deg'
+    if _is_near(direct):
+        words = f'use {chain.version}, which is this robot to {off}'
+    elif row.root_turn and fitted and fitted.mm <= _USABLE:
+        words = (f"{chain.version} fits to {_short(fitted.mm)} mm, but the robot's root frame is "
+                 f'turned by {row.root_turn}')
+    elif direct.mm <= _USABLE:
+        words = f'{chain.version} is nearest, to {off}'
+    else:
+        words = f'no table is nearer than {_USABLE:g} mm; {chain.version} is {off} off'
+        if fitted and fitted.deg > _NEAR:
+            words += ', and it is another mechanism'
+        elif fitted and fitted.mm <= 0.2 * direct.mm:
+            words += f', most of it a shift of its ends ({_short(fitted.mm)} mm fitted)'
+    return f'{chain.name}: {words}{_other_axes(row, rows)}'
 
 
-def _turn_of_axes(ours: Array, robot: Array) -> tuple[Array, str]:
-    """Return the turn by right angles that brings the tip's axes nearest, and its words."""
-    mean = (np.swapaxes(ours[:, :3, :3], 1, 2) @ robot[:, :3, :3]).mean(axis=0)
-    signed = (np.eye(3)[list(order)] * signs for order in permutations(range(3))
-              for signs in product((1, -1), repeat=3))
-    T = np.eye(4)
-    T[:3, :3] = max((R for R in signed if np.linalg.det(R) > 0),
-                    key=lambda R: float((R * mean).sum()))
-    *axis, w = matrix_to_quaternion(T[:3, :3]).tolist()
-    if w == 1.0:
-        return T, ''
-    about = ' '.join(f'{"-" if value < 0 else "+"} {name}' for value, name in zip(axis, 'xyz')
-                     if abs(value) > 1e-6).removeprefix('+ ')
-    return T, f'axes turned by {round(2 * math.degrees(math.acos(w)))} deg about {about}'
+def _other_axes(row: Comparison, rows: Sequence[Comparison]) -> str:
+    """Return which frames of a version have other axes than the robot's of their name."""
+    words = ''
+    for other in rows:
+        is_same = (other.chain.name, other.chain.version) == (row.chain.name, row.chain.version)
+        if is_same and other.turn:
+            words += f'; its {other.chain.frame_id} has other axes, turned by {other.turn}'
+    return words
 
 
-def _fitted(ours: Array, robot: Array) -> Array:
-    """Return X ours Y with the constant X and Y that bring it nearest to the robot's.
-
-    Gauss-Newton on both transforms, least squares by numpy; singular directions (a constant that
-    a joint can make up for) stay as they are.
-    """
-    X, Y = np.eye(4), np.eye(4)
-    best, least = ours, math.inf
-    for _ in range(20):
-        T = X @ ours @ Y
-        error = _error(T, robot)
-        size = float((error ** 2).sum())
-        if size < least:
-            best, least = T, size
-        columns = []
-        for side in (0, 1):
-            for k in range(6):
-                step = np.zeros(6)
-                step[k] = 1e-6
-                moved = _small(step) @ T if side == 0 else T @ _small(step)
-                columns.append((_error(moved, robot) - error).ravel() / 1e-6)
-        delta = np.linalg.lstsq(np.array(columns).T, -error.ravel(), rcond=1e-6)[0].astype(float)
-        X, Y = _small(delta[:6]) @ X, Y @ _small(delta[6:])
-        if np.abs(delta).max() < 1e-12:
-            break
-    return best
+def _is_near(found: Difference) -> bool:
+    return found.mm <= _NEAR and found.deg <= _NEAR
 
 
-def _error(T: Array, robot: Array) -> Array:
-    """Return the (N, 6) differences: positions [m], and small angles times an arm's length."""
-    turn = np.cross(T[:, :3, :3], robot[:, :3, :3], axis=1).sum(axis=2) / 2
-    return np.hstack((T[:, :3, 3] - robot[:, :3, 3], _ARM * turn))
+def _what_to_run(nearest: Sequence[Comparison], urdf: Urdf, args: argparse.Namespace
+                 ) -> list[str]:
+    """Return what to run for this robot, ready to paste."""
+    chains = [row.chain for row in nearest]
+    if all(_is_near(row.direct) for row in nearest):
+        named = ', '.join(f'{chain.name}={chain.version}' for chain in chains)
+        file = ''
+        if args.kinematics_file:
+            file = f' -p kinematics_file:={_absolute(args.kinematics_file)}'
+        return ['The tables are this robot:', f'  {_NODE} \\',
+                f'    -p chains:="[{named}]"{file}']
+    robot = Catalog.from_urdf(urdf)
+    output = shlex.quote(f'{Path(args.urdf).stem}.yaml')
+    node, table = '', ''
+    if not {chain.name for chain in chains} <= {*robot.known()}:
+        tips = [chain.frame_id for chain in chains]
+        root = chains[0].root_frame
+        node = f' -p chains:="[{", ".join(tips)}]" -p root_frame:={root}'
+        table = f' --root {shlex.quote(root)} --tips {shlex.join(tips)}'
+    return ["To compute with the robot's own geometry, from its description, from this file, or "
+            'from a table of it:',
+            f'  {_NODE} \\', f'    -p description_from_topic:=true{node}',
+            f'  {_NODE} \\', f'    -p kinematics_file:={_absolute(args.urdf)}{node}',
+            f'  leg_fk table {shlex.quote(args.urdf)}{table} -o {output}']
 
 
-def _small(step: Array) -> Array:
-    """Return the transform of a translation and a rotation vector."""
-    angle = float(np.linalg.norm(step[3:]))
-    T = np.eye(4)
-    T[:3, 3] = step[:3]
-    if angle:
-        T[:3, :3] = turns_about(step[3:] / angle, angle)
-    return T
-
-
-def _advice(row: Difference, file: str) -> str:
-    off = f'{_short(row.mm[0])} mm' + (f' and {_short(row.deg[0])} deg' if row.deg[0] > 0.1
-                                       else '')
-    but = f'; {row.turn}' if row.turn else ''
-    if row.mm[0] <= _NEAR and row.deg[0] <= 1.0:
-        return f'{row.chain}: use {row.version}, which is this robot to {off}{but}'
-    own = f'leg_fk table {file} --root {row.root} --tips {row.frame}'
-    if row.mm[0] <= _USABLE:
-        return (f'{row.chain}: {row.version} is nearest, to {off}{but}; for the rest make your '
-                f'own table: {own}')
-    why = ''
-    if row.fitted_mm and row.fitted_deg:
-        shifted = row.fitted_mm[0] <= 0.2 * row.mm[0] and row.fitted_deg[0] <= 1.0
-        if shifted:
-            why = f', most of it a shift of its ends ({_short(row.fitted_mm[0])} mm fitted)'
-        elif row.fitted_deg[0] > 1.0:
-            why = ', and it is another mechanism'
-    return (f'{row.chain}: no table is nearer than {_USABLE:g} mm; {row.version} is {off} off'
-            f'{why}{but}; make your own: {own}')
+def _absolute(file: str) -> str:
+    return shlex.quote(str(Path(file).resolve()))
 
 
 def _short(value: float) -> str:
+    if value < 0.001:
+        return 'less than 0.001'
     return f'{value:.0f}' if value >= 10 else f'{value:.2g}'
 
 
-def _cells(row: Difference) -> list[str]:
-    def both(pair: tuple[float, float] | None) -> str:
-        return 'too few joints' if pair is None else f'{pair[0]:.3f} ({pair[1]:.3f})'
+def _table(rows: Sequence[Sequence[str]]) -> list[str]:
+    widths = [max(map(len, column)) for column in zip(_HEADER, *rows, strict=True)]
+    lines = []
+    for cells in (_HEADER, *rows):
+        padded = [cell.rjust(width) if index in _NUMBERS else cell.ljust(width)
+                  for index, (cell, width) in enumerate(zip(cells, widths, strict=True))]
+        lines.append('  '.join(padded).rstrip())
+    return lines
 
-    marks = ', '.join(filter(None, ('<- nearest' if row.nearest else '', row.turn)))
-    return [row.chain, row.version, row.frame, both(row.mm), both(row.deg), both(row.fitted_mm),
-            both(row.fitted_deg), marks]
+
+def _cells(row: Comparison, is_nearest: bool) -> list[str]:
+    fits = ['-', '-']
+    if row.fitted:
+        fits = [_number(row.fitted.mm), _number(row.fitted.deg)]
+    return [row.chain.name, row.chain.version, row.chain.frame_id, _number(row.direct.mm),
+            _number(row.direct.deg), *fits, '<- nearest' if is_nearest else '']
 
 
-def _as_json(row: Difference) -> dict[str, Any]:
-    def both(pair: tuple[float, float] | None) -> dict[str, float] | None:
-        return None if pair is None else {'largest': pair[0], 'mean': pair[1]}
+def _number(value: float) -> str:
+    return f'{value:.1f}' if value >= 10 else f'{value:.3f}'
 
-    return {'chain': row.chain, 'version': row.version, 'root_frame': row.root,
-            'frame': row.frame, 'mm': both(row.mm),
-            'deg': both(row.deg), 'turn': row.turn, 'fitted_mm': both(row.fitted_mm),
-            'fitted_deg': both(row.fitted_deg), 'nearest': row.nearest}
+
+def _as_json(row: Comparison, is_nearest: bool) -> dict[str, Any]:
+    mm, deg = _pairs(row.direct)
+    fitted_mm, fitted_deg = _pairs(row.fitted) if row.fitted else (None, None)
+    return {
+        'chain': row.chain.name, 'version': row.chain.version,
+        'root_frame': row.chain.root_frame, 'frame': row.chain.frame_id, 'mm': mm, 'deg': deg,
+        'turn': row.turn, 'fitted_mm': fitted_mm, 'fitted_deg': fitted_deg,
+        'root_turn': row.root_turn, 'nearest': is_nearest}
+
+
+def _pairs(found: Difference) -> tuple[dict[str, float], dict[str, float]]:
+    return ({'largest': found.mm, 'mean': found.mean_mm},
+            {'largest': found.deg, 'mean': found.mean_deg})

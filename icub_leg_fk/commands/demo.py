@@ -8,19 +8,21 @@ from contextlib import closing
 from dataclasses import replace
 import os
 from pathlib import Path
-import shutil
 import sys
+from typing import Any
 
+from icub_leg_fk.commands.plot import default_instants
 from icub_leg_fk.kinematics import Catalog, Chain, config_file
-from icub_leg_fk.stream.configuration import DEFAULT_FRAME, LEGS
-from icub_leg_fk.tools import options, replay as replays
+from icub_leg_fk.stream.configuration import LEGS
+from icub_leg_fk.tools import options, text
 from icub_leg_fk.tools import recording as recordings
+from icub_leg_fk.tools import replay as replays
 from icub_leg_fk.tools.bags import import_rosbags
-from icub_leg_fk.tools.replay import Answers, Replay
 from icub_leg_fk.tools.drawing import check_output, feet_figure, save_picture
 from icub_leg_fk.tools.output_file import check_target, is_bag
-from icub_leg_fk.commands.plot import default_instants
 from icub_leg_fk.tools.recording import JointRecording
+from icub_leg_fk.tools.replay import Answers, Replay
+from icub_leg_fk.tools.terminal import import_rich
 import numpy as np
 
 EXAMPLES = """\
@@ -36,8 +38,10 @@ examples:
   leg_fk demo --version v1 --seconds 3 -o v1.png
   leg_fk demo --recording walking.csv"""
 
+_DEFAULT_PICTURE = 'demo.png'
 _COLUMNS = ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
-_COLORS = {'left foot': '\x1b[38;5;97m', 'right foot': '\x1b[38;5;172m', '': '\x1b[2m'}
+_WIDTH = len('-0.1234')  # of a cell, whatever the sign
+_COLOURS = ('color(97)', 'color(172)')  # of the left and the right foot, as in pictures
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -51,141 +55,198 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add(parser, '--version', '--foot-frame')
     options.add_output(parser, 'picture to write, .png, .svg or .pdf (default: demo.png, which is '
                        'replaced)')
-    parser.set_defaults(version='', foot_frame=DEFAULT_FRAME)
+    parser.set_defaults(kinematics_file=None)
 
 
 def run(args: argparse.Namespace) -> int:
     """Give the demonstration; return 1 if a pose is missing or the node failed."""
-    picture, force = Path(args.output or 'demo.png'), args.force or args.output is None
-    check_output(picture, force)
+    picture = Path(args.output or _DEFAULT_PICTURE)
+    may_replace = args.force or args.output is None
+    check_output(picture, may_replace)
     if args.save:
         import_rosbags()
         check_target(args.save, force=args.force, may_replace=is_bag)
-    catalog = Catalog.load()
-    chains = [catalog.chain(name, args.version, args.foot_frame) for name in LEGS]
-    version = chains[0].version
-    recording = recordings.read_csv(
-        args.recording or config_file('examples/synthetic_walk.csv'),
-        [name for chain in chains for name in chain.joint_names])
-    if args.seconds is not None:
-        recording = recording.first(args.seconds)
-    domain, namespace = replays.stay_on_this_machine(), f'/leg_fk_demo_{os.getpid()}'
-    print(f'iCub legs {version}: {len(recording.times)} JointState messages to '
-          f'foot_pose_publisher, poses back over DDS\n'
-          f'(this machine only, ROS_DOMAIN_ID {domain}, namespace {namespace})\n', flush=True)
+    chains = _legs(options.load_catalog(args), args)
+    recording = _recording(args, chains)
     try:
-        replay, whole = _play(namespace, recording, chains, args)
+        replay, is_whole = _play(recording, chains)
     except replays.DemoError as error:
         print(f'leg_fk: error: {error}', file=sys.stderr)
         return 1
-    status = conclude(replay.answers, recording.times[:len(replay.sent)].tolist(), whole)
-    if whole and all(answers.arrived for answers in replay.answers):
-        tracks = [replace(recording.track(chain), received=answers.poses).where(
-            np.isfinite(answers.latencies)) for chain, answers in zip(chains, replay.answers)]
-        title = f'{args.recording.name if args.recording else "synthetic gait"}   {version}'
-        save_picture(lambda: feet_figure(tracks, default_instants(tracks), title),
-                     picture, force=force)
+    status = conclude(replay.answers, recording.times[:len(replay.sent)].tolist(), is_whole)
+    if is_whole and all(answers.arrived for answers in replay.answers):
+        tracks = _tracks(recording, chains, replay.answers)
+        name = args.recording.name if args.recording else 'synthetic gait'
+        title = f'{name}   {chains[0].version}'
+        save_picture(lambda: feet_figure(tracks, default_instants(tracks), title), picture,
+                     force=may_replace)
         print(f'picture       {picture}', flush=True)
-    if whole and args.save:
+    if is_whole and args.save:
         recordings.write_joint_states(args.save, replay.sent, force=args.force)
         print(f'bag           {args.save}', flush=True)
     return status
 
 
-def _play(namespace: str, recording: JointRecording, chains: Sequence[Chain],
-          args: argparse.Namespace) -> tuple[Replay, bool]:
-    """Play the recording; return what came of it, and whether it was played to its end."""
-    tips = tuple(chain.tip for chain in chains)
-    parameters = {'version': args.version, 'foot_frame': args.foot_frame,
-                  **replays.lossless(namespace, tips, replays.DEPTH)}
+def _legs(catalog: Catalog, args: argparse.Namespace) -> list[Chain]:
+    chains = catalog.select(LEGS, args.version)
+    if args.foot_frame is None:
+        return list(chains)
+    return [chain.with_frame(args.foot_frame) for chain in chains]
+
+
+def _recording(args: argparse.Namespace, chains: Sequence[Chain]) -> JointRecording:
+    file = args.recording or config_file('examples/synthetic_walk.csv')
+    joints = [joint for chain in chains for joint in chain.joint_names]
+    recording = recordings.read_csv(file, joints)
+    return recording if args.seconds is None else recording.first(args.seconds)
+
+
+def _play(recording: JointRecording, chains: Sequence[Chain]) -> tuple[Replay, bool]:
+    """Play the recording to the node; return what came of it, and whether it was whole."""
+    domain = replays.stay_on_this_machine()
+    namespace = f'/leg_fk_demo_{os.getpid()}'
+    version, frame = chains[0].version, chains[0].frame
+    print(f'iCub legs {version}: {len(recording.times)} JointState messages to '
+          'foot_pose_publisher, poses back over DDS')
+    print(f'(this machine only, ROS_DOMAIN_ID {domain}, namespace {namespace})\n', flush=True)
+    tips = [chain.tip for chain in chains]
+    parameters = {'version': version, 'foot_frame': frame}
+    parameters |= replays.lossless(namespace, tips, replays.DEPTH)
+    seconds = float(recording.times[-1] - recording.times[0])
     with closing(Replay(recording, namespace, tips)) as replay, \
             replays.running_node(namespace, parameters) as (_, check):
+        display = Display(replay.answers, seconds, chains[0].root_frame)
         replay.wait_for_node(check)
-        seconds = float(recording.times[-1] - recording.times[0])
-        with LiveTable(replay.answers, seconds, chains[0].root_frame) as table:
-            try:
-                replay.play(table.show, table.period, check)
-                return replay, True
-            except KeyboardInterrupt:
-                return replay, False
+        try:
+            with display:
+                replay.play(display.show, display.period, check)
+        except KeyboardInterrupt:
+            return replay, False
+    return replay, True
 
 
-def conclude(answers: Sequence[Answers], times: Sequence[float], whole: bool) -> int:
+def _tracks(recording: JointRecording, chains: Sequence[Chain], answers: Sequence[Answers]
+            ) -> list[recordings.ChainTrack]:
+    """Return the chains with the poses that have come."""
+    tracks = []
+    for chain, received in zip(chains, answers, strict=True):
+        track = replace(recording.track(chain), received=received.poses)
+        tracks.append(track.where(np.isfinite(received.latencies)))
+    return tracks
+
+
+def conclude(answers: Sequence[Answers], times: Sequence[float], is_whole: bool) -> int:
     """Print the summary; return 0 if each message has its poses, 1 if not, 130 after Ctrl-C.
 
-    `times` [s] are those of the messages sent, `whole` tells whether all were.
+    Args:
+        answers: the poses of each tip.
+        times: times of the messages sent [s].
+        is_whole: whether all were sent.
     """
-    sent, arrived = len(times), sum(answer.arrived for answer in answers)
+    sent = len(times)
+    seconds = times[-1] - times[0] if sent else 0.0
+    arrived = sum(answer.arrived for answer in answers)
     lost = sent * len(answers) - arrived
+    of_tips = ', '.join(f'{answer.tip} {answer.arrived}' for answer in answers)
+    print(f'\nmessages in   {sent}  in {seconds:.2f} s')
+    print(f'poses out     {arrived}  ({of_tips})')
+    if is_whole:
+        print(f'lost          {lost or "none"}')
+    else:
+        print(f'interrupted   {lost} of the poses had not arrived; no picture, no bag')
+    print(f'latency       {_latency(answers) if arrived else "none"}', flush=True)
+    if not is_whole:
+        return 128 + 2  # as a shell reports SIGINT
     unexpected = sum(answer.unexpected for answer in answers)
-    latency = 'none' if not arrived else 'median {:.2f} ms   p99 {:.2f} ms   max {:.2f} ms'.format(
-        *1e3 * np.nanpercentile([answer.latencies for answer in answers], (50, 99, 100)))
-    missing = (f'lost          {lost or "none"}' if whole
-               else f'interrupted   {lost} of the poses had not arrived; no picture, no bag')
-    print(f'\nmessages in   {sent}  in {times[-1] - times[0] if sent else 0.0:.2f} s\n'
-          f'poses out     {arrived}  ({", ".join(f"{a.tip} {a.arrived}" for a in answers)})\n'
-          f'{missing}\n'
-          f'latency       {latency}', flush=True)
-    if whole and (lost or unexpected):
+    if lost or unexpected:
         print(f'leg_fk: error: of {sent * len(answers)} poses {lost} did not arrive, and '
               f'{unexpected} arrived that belong to no message', file=sys.stderr)
         return 1
-    return 0 if whole else 128 + 2  # as a shell reports SIGINT
+    return 0
 
 
-class LiveTable:
-    """Shows the newest poses every `period` [s]: on a terminal's second screen, else in lines."""
+def _latency(answers: Sequence[Answers]) -> str:
+    milliseconds = [1000 * answer.latencies for answer in answers]
+    median, p99, largest = np.nanpercentile(milliseconds, (50, 99, 100))
+    return f'median {median:.2f} ms   p99 {p99:.2f} ms   max {largest:.2f} ms'
+
+
+class Display:
+    """Shows the newest poses every `period` [s]: as a table on a terminal, else as lines.
+
+    Args:
+        answers: the poses of the left and of the right foot.
+        seconds: how long it will last [s].
+        frame: the frame of the poses.
+    """
 
     def __init__(self, answers: Sequence[Answers], seconds: float, frame: str) -> None:
-        self._feet = {each.tip.replace('_', ' '): each for each in answers}
-        self._seconds, self._frame = seconds, frame
-        self._live = sys.stdout.isatty() and os.environ.get('TERM', 'dumb') != 'dumb'
+        self._answers = answers
+        self._seconds = seconds
+        self._frame = frame
         self._elapsed = 0.0
+        self._live: Any = None
+        if sys.stdout.isatty() and os.environ.get('TERM', 'dumb') != 'dumb':
+            self._rich = import_rich('the live table')
+            console = self._rich.console.Console(markup=False, highlight=False)
+            self._live = self._rich.live.Live(
+                console=console,
+                screen=True,
+                auto_refresh=False,
+                redirect_stdout=False,
+                redirect_stderr=False)
         self.period = 0.1 if self._live else 1.0
 
-    def __enter__(self) -> LiveTable:
+    def __enter__(self) -> Display:
         if self._live:
-            print('\x1b[?1049h\x1b[?25l', end='', flush=True)  # second screen, no cursor
+            self._live.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         if self._live:
-            print(f'\x1b[?25h\x1b[?1049l{self._line()}', flush=True)
+            self._live.stop()
+            print(self._line(), flush=True)
 
     def show(self, elapsed: float) -> None:
         """Show the state at a time since the start [s]."""
         self._elapsed = elapsed
-        if not self._live:
+        if self._live:
+            self._live.update(self._table(), refresh=True)
+        else:
             print(self._line(), flush=True)
-            return
-        width, height = shutil.get_terminal_size()
-        rows = self._rows(max(0, (width - 13) // 9))
-        if len(rows) > height:
-            rows = [*rows[:max(0, height - 1)], ('', 'more rows: enlarge the terminal')]
-        colors = {} if os.environ.get('NO_COLOR') else _COLORS
-        plain = '\x1b[0m' if colors else ''
-        picture = '\r\n'.join(f'{colors.get(name, "")}{row[:width]}{plain}\x1b[K'
-                              for name, row in rows)
-        print(f'\x1b[H{picture}\x1b[J', end='', flush=True)
 
     def _line(self) -> str:
-        feet = '   '.join(f'{name}: ' + ('x {:+.4f}  y {:+.4f}  z {:+.4f} m'.format(
-            *answers.poses[answers.newest, :3]) if answers.arrived else 'no pose yet')
-            for name, answers in self._feet.items())
-        return f'{self._elapsed:7.2f} s   in {self._frame}: {feet}'
+        feet = []
+        for answers in self._answers:
+            found = 'no pose yet'
+            if answers.arrived:
+                x, y, z = answers.poses[answers.newest, :3]
+                found = f'x {x:+.4f}  y {y:+.4f}  z {z:+.4f} m'
+            feet.append(f'{_name(answers)}: {found}')
+        return f'{self._elapsed:7.2f} s   in {self._frame}: {"   ".join(feet)}'
 
-    def _rows(self, columns: int) -> list[tuple[str, str]]:
-        """Return the rows of the table, each with the foot it is about."""
-        shown = _COLUMNS[:columns]
-        rows = [('', f'poses in {self._frame}, in m'),
-                ('', ' ' * 12 + ''.join(f'{name:>9}' for name in shown))]
-        for name, answers in self._feet.items():
-            newest = (answers.poses[answers.newest].round(4) + 0.0).tolist()  # no negative zeros
-            rows.append((name, f'{name:12}' + (''.join(
-                f'{value:9.4f}' for value in newest[:len(shown)])
-                if answers.arrived else '  no pose yet')))
-        if len(shown) < len(_COLUMNS):
-            rows.append(('', f'{len(_COLUMNS) - len(shown)} more columns: widen the terminal'))
-        poses = sum(answers.arrived for answers in self._feet.values())
-        return [*rows, ('', ''),
-                ('', f'{self._elapsed:.2f} of {self._seconds:.2f} s, {poses} poses')]
+    def _table(self) -> Any:
+        Text = self._rich.text.Text
+        poses = sum(answers.arrived for answers in self._answers)
+        table = self._rich.table.Table(
+            box=None,
+            title=Text(f'poses in {self._frame}, in m'),
+            caption=Text(f'{self._elapsed:.2f} of {self._seconds:.2f} s, {poses} poses'))
+        table.add_column(no_wrap=True)
+        for name in _COLUMNS:
+            table.add_column(Text(name), justify='right', no_wrap=True)
+        for answers, colour in zip(self._answers, _COLOURS, strict=True):
+            cells = [Text(_name(answers)), *map(Text, _cells(answers))]
+            table.add_row(*cells, style=colour)
+        return table
+
+
+def _name(answers: Answers) -> str:
+    return answers.tip.replace('_', ' ')
+
+
+def _cells(answers: Answers) -> list[str]:
+    if not answers.arrived:
+        return ['-'.rjust(_WIDTH)] * len(_COLUMNS)
+    newest = answers.poses[answers.newest].tolist()
+    return [text.fixed(value, 4).rjust(_WIDTH) for value in newest]

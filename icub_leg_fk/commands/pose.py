@@ -2,6 +2,9 @@
 
 import argparse
 
+from icub_leg_fk.kinematics import Chain
+from icub_leg_fk.kinematics.chain_text import joint_range, position
+from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.tools import options, text
 
 EXAMPLES = """\
@@ -10,9 +13,11 @@ quaternion is x y z w. Positions outside a documented range are computed as they
 
 examples:
   leg_fk pose left_leg --degrees 0 0 0 0 0 0
-  leg_fk pose right_leg --version v1 --radians 0.1 -0.2 0 -0.5 -1e-2 0 --foot-frame sole
-  leg_fk pose head_imu --version v2 --degrees 0 0 0 10 0 -20 --json
-  leg_fk pose arm -k my_robot.yaml --version v1 --degrees 90 0.25 45"""
+  leg_fk pose right_leg=v1 --radians 0.1 -0.2 0 -0.5 -1e-2 0 --foot-frame sole
+  leg_fk pose head_imu --degrees 0 0 0 10 0 -20 --json
+  leg_fk pose arm -k my_robot.yaml --degrees 90 0.25 45"""
+
+_DECIMALS = 7
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,24 +33,53 @@ def run(args: argparse.Namespace) -> int:
     T = chain.forward(q) + 0.0  # no negative zeros
     quaternion = [value + 0.0 for value in chain.pose(q)[3:]]
     if args.json:
-        print(text.as_json({
-            'chain': chain.name, 'version': chain.version, 'root_frame': chain.root_frame,
-            'frame_id': chain.frame_id, 'position': T[:3, 3].tolist(), 'quaternion': quaternion,
-            'matrix': T.tolist()}))
-        return 0
-    outside = chain.out_of_range(q)
-    joints = text.columns([
-        [name, *text.position(link, value).split(),
-         f'range {text.joint_range(link)}' if text.joint_range(link) else '',
-         '<- outside' if name in outside else '']
-        for name, link, value in zip(chain.joint_names, chain.joints, q, strict=True)])
-    x, y, z, *xyzw = (text.fixed(value, 7) for value in (*T[:3, 3].tolist(), *quaternion))
-    matrix = text.matrix([[text.fixed(value, 7) for value in row] for row in T[:3].tolist()]
-                         + [['0', '0', '0', '1']], '  ')
-    print(f'{chain.name} {chain.version}: {chain.frame_id} in {chain.root_frame}', '',
-          *text.indented(joints), '', 'matrix (translation in m)', *text.indented(matrix), '',
-          *text.columns([['position (m)', 'x', x, 'y', y, 'z', z]]), *text.columns(
-              [['quaternion  ', *(word for pair in zip('xyzw', xyzw) for word in pair)]]),
-          *(line for note in text.range_notes(chain, q) for line in ('', *text.wrapped(note))),
-          sep='\n')
+        print(_as_json(chain, T, quaternion))
+    else:
+        print(*_as_text(chain, q, T, quaternion), sep='\n')
     return 0
+
+
+def _as_json(chain: Chain, T: Array, quaternion: list[float]) -> str:
+    return text.as_json({
+        'chain': chain.name,
+        'version': chain.version,
+        'root_frame': chain.root_frame,
+        'frame_id': chain.frame_id,
+        'position': T[:3, 3].tolist(),
+        'quaternion': quaternion,
+        'matrix': T.tolist(),
+    })
+
+
+def _as_text(chain: Chain, q: list[float], T: Array, quaternion: list[float]) -> list[str]:
+    lines = [f'{chain.name} {chain.version}: {chain.frame_id} in {chain.root_frame}', '']
+    lines += text.indented(_joints(chain, q))
+    lines += ['', 'matrix (translation in m)']
+    matrix = [_numbers(row) for row in T[:3].tolist()]
+    lines += text.indented(text.matrix([*matrix, ['0', '0', '0', '1']], '  '))
+    lines += ['', _named('position (m)', 'xyz', _numbers(T[:3, 3].tolist()))]
+    lines += [_named('quaternion  ', 'xyzw', _numbers(quaternion))]
+    for note in text.range_notes(chain, q):
+        lines += ['', *text.wrapped(note)]
+    return lines
+
+
+def _joints(chain: Chain, q: list[float]) -> list[str]:
+    """Return a line for each joint: its position, its range, and whether it is outside."""
+    outside = chain.out_of_range(q)
+    rows = []
+    for name, link, value in zip(chain.joint_names, chain.joints, q, strict=True):
+        bounds = joint_range(link)
+        found = f'range {bounds}' if bounds else ''
+        remark = '<- outside' if name in outside else ''
+        rows.append([name, *position(link, value).split(), found, remark])
+    return text.columns(rows)
+
+
+def _numbers(values: list[float]) -> list[str]:
+    return [text.fixed(value, _DECIMALS) for value in values]
+
+
+def _named(title: str, names: str, numbers: list[str]) -> str:
+    words = [f'{name}  {number}' for name, number in zip(names, numbers, strict=True)]
+    return '  '.join([title, *words])

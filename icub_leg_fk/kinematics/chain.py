@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-from array import array
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 import math
-import reprlib
 from typing import NamedTuple, NoReturn
 
-from icub_leg_fk.errors import JointVectorError, LegFKError, UnknownNameError
+from icub_leg_fk.errors import LegFKError, UnknownNameError
 from icub_leg_fk.kinematics import chain_text
 from icub_leg_fk.kinematics.frozen import Frozen
-from icub_leg_fk.kinematics.link import DHLink
-from icub_leg_fk.kinematics.rotation import Array, is_rigid_transform, nearest_rotation
+from icub_leg_fk.kinematics.joint_vector import joint_array, joint_floats, JointVector, too_large
+from icub_leg_fk.kinematics.link import CONVENTIONS, DHLink, modified_rows
+from icub_leg_fk.kinematics.rotation import Array, rigid_transform
 from icub_leg_fk.kinematics.solver import Pose, Solver, Twist
 import numpy as np
 from numpy.typing import ArrayLike
-
-CONVENTIONS = ('standard', 'modified')
-
-JointPositions = Sequence[float] | Mapping[str, float] | Array
 
 
 class Row(NamedTuple):
@@ -40,6 +35,9 @@ class Row(NamedTuple):
     joint_index: int
     is_first: bool
 
+    def __repr__(self) -> str:
+        return f'<Row {self.joint[:12] or "fixed"}: {replace(self.link, joint="")!r}>'
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TipFrame(Frozen):
@@ -54,6 +52,11 @@ class TipFrame(Frozen):
     frame_id: str
     T_tip_frame: Array = field(default_factory=lambda: np.eye(4))
     outline: Array | None = None
+
+    def __post_init__(self) -> None:
+        T = rigid_transform(self.T_tip_frame, f'transform of tip frame {self.frame_id}')
+        object.__setattr__(self, 'T_tip_frame', T)
+        super().__post_init__()
 
     def __repr__(self) -> str:
         return f'<TipFrame {self.frame_id[:60]}>'
@@ -105,8 +108,13 @@ class Chain(Frozen):
         if len(set(self.joint_names)) < len(self.joint_names):
             self._refuse(f'joints are {", ".join(self.joint_names)}; allowed: each joint once')
         _ = self._row_joints  # refuses rows that do not fit the joints
+        last = self.links[-1]
+        if self.convention == 'modified' and (last.a or last.alpha):
+            self._refuse(f'a and alpha after the last joint are {last.a:g} and {last.alpha:g}; '
+                         'allowed in the modified convention: 0, with T_n_tip instead')
         for name in ('T_root_0', 'T_n_tip'):
-            object.__setattr__(self, name, self._checked_transform(name))
+            transform = rigid_transform(getattr(self, name), f'{name} of chain {self.name}')
+            object.__setattr__(self, name, transform)
         frames = dict(self.tip_frames) or {self.tip: TipFrame(self.tip)}
         object.__setattr__(self, 'tip_frames', frames)
         object.__setattr__(self, 'frame', self.frame or next(iter(frames)))
@@ -142,15 +150,7 @@ class Chain(Frozen):
 
     def rows(self) -> tuple[Row, ...]:
         """Return the table's rows with their joints, in the chain's own convention."""
-        links, joints = self.links, self._row_joints
-        if self.convention == 'modified':
-            links = modified_rows(self.links)
-            joints = joints[len(joints) - len(links):]
-        rows = []
-        for index, (link, joint) in enumerate(zip(links, joints, strict=True)):
-            name = '' if link.is_fixed else self.joint_names[joint]
-            rows.append(Row(link, name, joint, joint >= 0 and joint not in joints[:index]))
-        return tuple(rows)
+        return self._rows
 
     def with_frame(self, frame: str) -> Chain:
         """Return the same chain with its poses in another frame of its tip.
@@ -160,10 +160,10 @@ class Chain(Frozen):
         """
         return self if frame == self.frame else replace(self, frame=frame)
 
-    def forward(self, q: ArrayLike | Mapping[str, float]) -> Array:
+    def forward(self, q: ArrayLike | Mapping[str, ArrayLike]) -> Array:
         """Return the transform from the tip's frame to the root frame.
 
-        The straight way: the product of the matrices as the tables define them.
+        The straight way: the product of the matrices as the table defines them.
 
         Args:
             q: (..., n) joint positions [rad or m], or a mapping from joint names.
@@ -172,11 +172,17 @@ class Chain(Frozen):
             (..., 4, 4) transforms.
 
         Raises:
-            JointVectorError: q is not (..., n), or an entry is no finite number.
+            JointVectorError: q is not (..., n), an entry is no finite number, or a joint is
+                missing.
         """
-        return deque(self._transforms(self._array(q)), maxlen=1).pop()
+        positions = joint_array(q, self.joint_names)
+        with np.errstate(all='ignore'):
+            T = self._T_root_0_for(positions)
+            for link, joint in self._moved_links:
+                T = T @ link.transform(positions[..., joint])
+            return _finite(T @ self._T_n_frame)
 
-    def frames(self, q: ArrayLike | Mapping[str, float]) -> Array:
+    def frames(self, q: ArrayLike | Mapping[str, ArrayLike]) -> Array:
         """Return every frame of the table in the root frame, in the chain's own convention.
 
         Args:
@@ -186,35 +192,34 @@ class Chain(Frozen):
             (..., m + 2, 4, 4): frame 0, a frame for each of the m rows, and the tip's.
 
         Raises:
-            JointVectorError: q is not (..., n), or an entry is no finite number.
+            JointVectorError: q is not (..., n), an entry is no finite number, or a joint is
+                missing.
         """
-        return np.stack([*self._transforms(self._array(q))], axis=-3)
+        positions = joint_array(q, self.joint_names)
+        is_modified = self.convention == 'modified'
+        with np.errstate(all='ignore'):
+            frames = [self._T_root_0_for(positions)]
+            for link, _, joint, _ in self._rows:
+                transform = link.modified_transform if is_modified else link.transform
+                frames.append(frames[-1] @ transform(positions[..., joint]))
+            frames.append(frames[-1] @ self._T_n_frame)
+            return _finite(np.stack(frames, axis=-3))
 
-    def _transforms(self, q: Array) -> Iterator[Array]:
-        """Yield frame 0, the frame of each row, and the tip's, (..., 4, 4) each."""
-        transform = _modified_transform if self.convention == 'modified' else DHLink.transform
-        T = np.broadcast_to(self.T_root_0, (*q.shape[:-1], 4, 4))
-        yield T
-        for row in self.rows():
-            position = 0.0 if row.link.is_fixed else q[..., row.joint_index]
-            T = T @ transform(row.link, position)
-            yield T
-        yield T @ self._T_n_frame
-
-    def sole_outline(self, q: ArrayLike | Mapping[str, float]) -> Array | None:
-        """Return the (K, 3) corners of the sole in the root frame [m]; None if there is no sole.
+    def sole_outline(self, q: ArrayLike | Mapping[str, ArrayLike]) -> Array | None:
+        """Return the corners of the sole in the root frame; None if the tip has no sole.
 
         Args:
             q: (n,) joint positions [rad or m], or a mapping from joint names.
-        """
-        for name, tip_frame in self.tip_frames.items():
-            if tip_frame.outline is not None:
-                corners = np.pad(tip_frame.outline, ((0, 0), (0, 1)))
-                T = self.with_frame(name).forward(q)
-                return corners @ T[:3, :3].T + T[:3, 3]
-        return None
 
-    def pose(self, q: JointPositions) -> Pose:
+        Returns:
+            (K, 3) corners [m].
+        """
+        if self._outline is None:
+            return None
+        T = self.forward(q)
+        return self._outline @ T[:3, :3].T + T[:3, 3]
+
+    def pose(self, q: JointVector) -> Pose:
         """Return x, y, z [m] and the unit quaternion qx, qy, qz, qw for one joint vector, fast.
 
         Of the two unit quaternions it is the one nearer to the tip frame's orientation at q = 0,
@@ -229,30 +234,31 @@ class Chain(Frozen):
                 missing.
         """
         try:
-            pose = self._solver.pose(self._vector(q))
+            pose = self._solver.pose(joint_floats(q, self.joint_names))
         except (ArithmeticError, TypeError, ValueError) as error:
-            self._refuse_vector('q', q, error)
+            self._refuse_vector(q, 'q', error)
         if not math.isfinite(pose.x + pose.y + pose.z):
-            self._refuse_vector('q', q)
+            self._refuse_vector(q, 'q')
         return pose
 
-    def poses(self, Q: ArrayLike) -> Array:
-        """Return the (N, 7) rows x, y, z [m], qx, qy, qz, qw of N joint vectors, as `pose` does.
+    def poses(self, Q: ArrayLike | Mapping[str, ArrayLike]) -> Array:
+        """Return the poses of many joint vectors, each as `pose` does.
 
         Memory beyond the result does not grow with N.
 
         Args:
-            Q: (N, n) joint positions [rad or m].
+            Q: (N, n) joint positions [rad or m], or a mapping from joint names to (N,) ones.
+
+        Returns:
+            (N, 7) rows x, y, z [m], qx, qy, qz, qw.
 
         Raises:
-            JointVectorError: Q is not (N, n), or an entry is no finite number.
+            JointVectorError: Q is not (N, n), an entry is no finite number, or a joint is
+                missing.
         """
-        poses = self._solver.poses(self._array(Q, 2))
-        if not np.isfinite(poses).all():
-            raise _too_large('q')
-        return poses
+        return _finite(self._solver.poses(joint_array(Q, self.joint_names, 2)))
 
-    def jacobian(self, q: JointPositions) -> Array:
+    def jacobian(self, q: JointVector) -> Array:
         """Return the geometric Jacobian of the tip, in the axes of the root frame.
 
         A row adds (z x (p_tip - p), z) if revolute and (z, 0) if prismatic to the column of its
@@ -267,23 +273,26 @@ class Chain(Frozen):
             of joint velocity.
 
         Raises:
-            JointVectorError: q has not n entries, or one is no finite number.
+            JointVectorError: q has not n entries, or one is no finite number, or a joint is
+                missing.
         """
-        q = self._array(q, 1)
+        positions = joint_array(q, self.joint_names, 1)
         J = np.zeros((6, self.n))
-        tip = self.forward(q)[:3, 3]
-        T = self.T_root_0
-        for link, joint in zip(self.links, self._row_joints, strict=True):
-            axis = link.gain * T[:3, 2]
-            if link.is_prismatic:
-                J[:3, joint] += axis
-            elif not link.is_fixed:
-                J[:3, joint] += np.cross(axis, tip - T[:3, 3])
-                J[3:, joint] += axis
-            T = T @ link.transform(0.0 if link.is_fixed else q[joint])
-        return J
+        with np.errstate(all='ignore'):
+            before = [self.T_root_0]
+            for link, joint in self._moved_links:
+                before.append(before[-1] @ link.transform(positions[joint]))
+            tip = (before[-1] @ self._T_n_frame)[:3, 3]
+            for (link, joint), T in zip(self._moved_links, before[:-1], strict=True):
+                axis = link.gain * T[:3, 2]
+                if link.is_prismatic:
+                    J[:3, joint] += axis
+                elif not link.is_fixed:
+                    J[:3, joint] += np.cross(axis, tip - T[:3, 3])
+                    J[3:, joint] += axis
+        return _finite(J)
 
-    def twist(self, q: JointPositions, qdot: JointPositions) -> Twist:
+    def twist(self, q: JointVector, qdot: JointVector) -> Twist:
         """Return the tip's vx, vy, vz [m/s] and wx, wy, wz [rad/s] in the axes of the root frame.
 
         Args:
@@ -291,34 +300,33 @@ class Chain(Frozen):
             qdot: (n,) joint velocities [rad/s or m/s]; likewise.
 
         Raises:
-            JointVectorError: q or qdot has not n entries, or one is no finite number.
+            JointVectorError: q or qdot has not n entries, or one is no finite number, or a joint
+                is missing.
         """
         try:
-            twist = self._solver.twist(self._vector(q), self._vector(qdot))
+            positions = joint_floats(q, self.joint_names)
+            twist = self._solver.twist(positions, joint_floats(qdot, self.joint_names, 'qdot'))
         except (ArithmeticError, TypeError, ValueError) as error:
-            self._array(q, 1, 'q')
-            self._refuse_vector('qdot', qdot, error)
+            joint_array(q, self.joint_names, 1)
+            self._refuse_vector(qdot, 'qdot', error)
         if not math.isfinite(sum(twist)):
-            self._array(q, 1, 'q')
-            self._refuse_vector('qdot', qdot)
+            joint_array(q, self.joint_names, 1)
+            self._refuse_vector(qdot, 'qdot')
         return twist
 
-    def out_of_range(self, q: JointPositions) -> tuple[str, ...]:
+    def out_of_range(self, q: JointVector) -> tuple[str, ...]:
         """Return the names of the joints whose position is outside `lower` to `upper`.
 
         Args:
             q: (n,) joint positions [rad or m], or a mapping from joint names.
 
         Raises:
-            JointVectorError: q has not n entries, or one is no finite number.
+            JointVectorError: q has not n entries, or one is no finite number, or a joint is
+                missing.
         """
-        positions = self._array(q, 1)
+        positions = joint_array(q, self.joint_names, 1)
         outside = (positions < self.lower) | (positions > self.upper)
         return tuple(self.joint_names[joint] for joint in np.flatnonzero(outside))
-
-    @cached_property
-    def _T_n_frame(self) -> Array:
-        return self.T_n_tip @ self.tip_frames[self.frame].T_tip_frame
 
     @cached_property
     def _row_joints(self) -> tuple[int, ...]:
@@ -343,63 +351,51 @@ class Chain(Frozen):
         return tuple(row_joints)
 
     @cached_property
+    def _moved_links(self) -> tuple[tuple[DHLink, int], ...]:
+        """The standard rows, each with the index of the joint that moves it."""
+        return tuple(zip(self.links, self._row_joints, strict=True))
+
+    @cached_property
+    def _rows(self) -> tuple[Row, ...]:
+        links, joints = self.links, self._row_joints
+        if self.convention == 'modified':
+            links = modified_rows(self.links)
+            joints = joints[len(joints) - len(links):]
+        rows = []
+        for index, (link, joint) in enumerate(zip(links, joints, strict=True)):
+            name = '' if link.is_fixed else self.joint_names[joint]
+            is_first = not link.is_fixed and joint not in joints[:index]
+            rows.append(Row(link, name, joint, is_first))
+        return tuple(rows)
+
+    @cached_property
+    def _T_n_frame(self) -> Array:
+        return self.T_n_tip @ self.tip_frames[self.frame].T_tip_frame
+
+    @cached_property
+    def _outline(self) -> Array | None:
+        """The (K, 3) corners of the sole in the tip's frame [m]."""
+        for tip_frame in self.tip_frames.values():
+            if tip_frame.outline is not None:
+                corners = np.pad(tip_frame.outline, ((0, 0), (0, 1)))
+                T_tip_frame = self.tip_frames[self.frame].T_tip_frame
+                T = np.linalg.inv(T_tip_frame) @ tip_frame.T_tip_frame
+                return np.asarray(corners @ T[:3, :3].T + T[:3, 3])
+        return None
+
+    @cached_property
     def _solver(self) -> Solver:
         R_zero = self.forward(np.zeros(self.n))[:3, :3]
         return Solver(self.links, self._row_joints, self.T_root_0, self._T_n_frame, R_zero)
 
-    def _vector(self, q: JointPositions) -> Sequence[float]:
-        """Return n joint positions as floats, not yet known to be finite."""
-        if type(q) is list or type(q) is tuple:
-            if len(q) == self.n:
-                return array('d', q)
-        return self._array(q, 1).tolist()  # type: ignore[no-any-return]
+    def _T_root_0_for(self, positions: Array) -> Array:
+        return np.broadcast_to(self.T_root_0, (*positions.shape[:-1], 4, 4))
 
-    def _array(self, q: ArrayLike | Mapping[str, float], ndim: int | None = None,
-               name: str = 'q') -> Array:
-        """Return q in float64, if it is (..., n) finite real numbers of ndim dimensions."""
-        if isinstance(q, Mapping):
-            q = self._ordered(q, name)
-        shape = {1: f'({self.n},)', 2: f'(N, {self.n})', None: f'(..., {self.n})'}[ndim]
-        allowed = f'{shape} finite real numbers, one per joint'
-        try:
-            values = np.asarray(q)
-        except (OverflowError, TypeError, ValueError) as error:
-            raise JointVectorError(name, f'is not an array of numbers ({error})',
-                                   allowed) from error
-        is_masked = type(q).__module__.startswith('numpy.ma')  # whose import takes a start 7 ms
-        is_number = values.dtype.kind in 'biuf' or not values.size
-        if isinstance(q, (str, bytes)) or is_masked or not is_number:
-            found = type(q).__name__ + (f' of {values.dtype.name}' if values.ndim else '')
-            raise JointVectorError(name, f'is a {found}', allowed)
-        has_shape = values.ndim == ndim if ndim else values.ndim >= 1
-        if not has_shape or values.shape[-1] != self.n:
-            raise JointVectorError(name, f'has the shape {values.shape}', allowed)
-        values = values.astype(float, copy=False)
-        _refuse_not_finite(name, values)
-        return values
-
-    def _ordered(self, q: Mapping[str, float], name: str) -> list[float]:
-        """Return the joint positions of a mapping in the order of the joints."""
-        missing = [joint for joint in self.joint_names if joint not in q]
-        if missing:
-            raise JointVectorError(name, f'lacks {", ".join(missing)}',
-                                   f'a mapping with all of {", ".join(self.joint_names)}')
-        return [q[joint] for joint in self.joint_names]
-
-    def _refuse_vector(self, name: str, q: JointPositions,
-                       error: Exception | None = None) -> NoReturn:
+    def _refuse_vector(self, q: JointVector, name: str, error: Exception | None = None
+                       ) -> NoReturn:
         """Raise the error that says what is wrong with a vector that gave no finite result."""
-        self._array(q, 1, name)
-        raise _too_large(name) from error
-
-    def _checked_transform(self, name: str) -> Array:
-        T = np.array(getattr(self, name), dtype=float)
-        if T.shape != (4, 4) or not is_rigid_transform(T):
-            found = ' '.join(str(T.tolist()).split())
-            self._refuse(f'{name} is {reprlib.repr(found)}; allowed: a (4, 4) rotation and '
-                         'translation with the last row 0 0 0 1')
-        T[:3, :3] = nearest_rotation(T[:3, :3])
-        return T
+        joint_array(q, self.joint_names, 1, name)
+        raise too_large(name) from error
 
     def _refuse_joints(self) -> NoReturn:
         moving = sum(not link.is_fixed for link in self.links)
@@ -411,8 +407,8 @@ class Chain(Frozen):
 
     def __repr__(self) -> str:
         joints = 'joint' if self.n == 1 else 'joints'
-        return (f'<Chain {self.name[:30]} {self.version[:20]}: {self.n} {joints}, '
-                f'{self.root_frame[:30]} to {self.frame_id[:30]}>')
+        return (f'<Chain {self.name[:20]} {self.version[:10]}: {self.n} {joints}, '
+                f'{self.root_frame[:20]} to {self.frame_id[:20]}>')
 
     def __str__(self) -> str:
         return chain_text.as_text(self)
@@ -421,52 +417,10 @@ class Chain(Frozen):
         return chain_text.as_html(self)
 
 
-def modified_rows(links: Sequence[DHLink]) -> tuple[DHLink, ...]:
-    """Return standard rows in the modified convention (Craig, Introduction to Robotics, 1986).
-
-    There A_i = Rx(alpha) Tx(a) Rz(theta) Tz(d), with a and alpha before the joint instead of
-    after it, so each row takes them from the standard row before.
-    """
-    a = alpha = 0.0
-    first = links[0]
-    if first.is_fixed and first.d == first.offset == 0.0:  # as `standard_rows` made it
-        a, alpha, links = first.a, first.alpha, links[1:]
-    rows = []
-    for link in links:
-        rows.append(replace(link, a=a, alpha=alpha))
-        a, alpha = link.a, link.alpha
-    return tuple(rows)
-
-
-def standard_rows(rows: Sequence[DHLink]) -> tuple[DHLink, ...]:
-    """Return rows of the modified convention as standard ones; inverse of `modified_rows`."""
-    next_ones = [(row.a, row.alpha) for row in rows[1:]]
-    next_ones.append((0.0, 0.0))
-    links = [replace(row, a=a, alpha=alpha)
-             for row, (a, alpha) in zip(rows, next_ones, strict=True)]
-    if rows and (rows[0].a or rows[0].alpha):
-        links.insert(0, DHLink(a=rows[0].a, d=0.0, alpha=rows[0].alpha, joint_type='fixed'))
-    return tuple(links)
-
-
-def _modified_transform(row: DHLink, q: ArrayLike) -> Array:
-    """Return Rx(alpha) Tx(a) Rz(theta) Tz(d) of a row in the modified convention."""
-    before = DHLink(a=row.a, d=0.0, alpha=row.alpha).transform()
-    return before @ replace(row, a=0.0, alpha=0.0).transform(q)
-
-
-def _refuse_not_finite(name: str, values: Array) -> None:
-    with np.errstate(all='ignore'):
-        is_finite = math.isfinite(values.sum())  # a mask as large as the values only if needed
-    if is_finite or np.isfinite(values).all():
-        return
-    index = tuple(np.argwhere(~np.isfinite(values))[0].tolist())
-    place = ', '.join(map(str, index))
-    raise JointVectorError(f'{name}[{place}]', f'is {values[index]}', 'finite numbers')
-
-
-def _too_large(name: str) -> JointVectorError:
-    return JointVectorError(name, 'has values too large to compute with', 'finite numbers')
+def _finite(values: Array) -> Array:
+    if not np.isfinite(values).all():
+        raise too_large('q')
+    return values
 
 
 def _read_only(values: Sequence[float]) -> Array:

@@ -11,8 +11,8 @@ import numpy as np
 class Frozen:
     """Base of a frozen dataclass that holds arrays or mappings.
 
-    Arrays and mappings are read-only copies, also after copying and pickling. Two instances are
-    equal if their compared fields are, by value; -0.0 equals 0.0.
+    Arrays and mappings are read-only copies and lists are tuples, also after copying and
+    pickling. Two instances are equal if their compared fields are, by value; -0.0 equals 0.0.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
@@ -25,7 +25,9 @@ class Frozen:
         return type(self), tuple(_picklable(getattr(self, field.name)) for field in fields(self))
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, type(self)) and self._key() == other._key()
+        if not isinstance(other, type(self)):
+            return NotImplemented
+        return self._key() == other._key()
 
     def __hash__(self) -> int:
         return hash(self._key())
@@ -40,13 +42,15 @@ def _read_only(value: Any) -> Any:
         array = np.array(value, dtype=float)
         array.flags.writeable = False
         return array
-    if isinstance(value, Mapping):
+    if isinstance(value, (dict, MappingProxyType)):
         return MappingProxyType(dict(value))
+    if isinstance(value, list):
+        return tuple(value)
     return value
 
 
 def _picklable(value: Any) -> Any:
-    return dict(value) if isinstance(value, Mapping) else value
+    return dict(value) if isinstance(value, MappingProxyType) else value
 
 
 def _hashable(value: Any) -> Hashable:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 import math
 from pathlib import Path
+from typing import TypeVar
 
-from icub_leg_fk.errors import LegFKError
-from icub_leg_fk.kinematics.chain import Chain, CONVENTIONS, standard_rows, TipFrame
+from icub_leg_fk.kinematics.chain import Chain, TipFrame
 from icub_leg_fk.kinematics.frozen import Frozen
-from icub_leg_fk.kinematics.link import DHLink, JOINT_TYPES
+from icub_leg_fk.kinematics.link import CONVENTIONS, DHLink, JOINT_TYPES, standard_rows
 from icub_leg_fk.kinematics.rotation import Array, is_rigid_transform, nearest_rotation
 from icub_leg_fk.kinematics.yaml_fields import Field, FRAME_ID, read_yaml, WORD
 import numpy as np
+
+_Value = TypeVar('_Value')
+_Default = TypeVar('_Default')
 
 _LENGTHS = ('mm', 'm')
 _ANGLES = ('deg', 'rad')
@@ -22,9 +25,10 @@ _DIRECTIONS = {
     'up': (0, 0, 1), 'down': (0, 0, -1)}
 _LONGEST = 1e9  # m; what is larger leaves no room to compute with
 _UNLIKELY = 100.0  # m
+_NO_RANGE = (-math.inf, math.inf)
 _FOUR_DECIMALS = 2e-4  # what rounding to four decimals may do to R R^T
 _EXACT = 1e-9  # below it a rotation was written with all its digits
-_MOST_VERSIONS = 10_000  # aliases can make a small file say very much
+_MOST_ROWS = 10_000  # aliases can make a small file say very much
 
 _PLACE = ('root_frame', 'joints', 'tip_frames')
 _REPLACEABLE = (*_PLACE, 'root_axes')
@@ -77,7 +81,7 @@ class _Reader:
     def __init__(self) -> None:
         self.warnings: list[str] = []
         self._length = self._angle = ''
-        self._versions_read = 0
+        self._rows_read = 0
 
     def chains(self, path: str | Path) -> tuple[str, dict[str, ChainEntry]]:
         root = read_yaml(path)
@@ -121,7 +125,7 @@ class _Reader:
         """Return the chain's own default, or the file's, or the only version; else nothing."""
         if 'default_version' in chain:
             return chain['default_version'].choice(tuple(versions))
-        default = top['default_version'].name('a version') if 'default_version' in top else ''
+        default = _given(top, 'default_version', lambda at: at.name('a version'), '')
         if default in versions:
             return default
         return next(iter(versions)) if len(versions) == 1 else ''
@@ -131,9 +135,6 @@ class _Reader:
             'versions by name', lambda version: f'chain {name}, version {version}')
         if not versions:
             chain['versions'].fail('at least one version', 'none')
-        self._versions_read += len(versions)
-        if self._versions_read > _MOST_VERSIONS:
-            chain['versions'].fail(f'at most {_MOST_VERSIONS} in a file', 'too many versions')
         return {version: self._version(name, tip, version, at, chain)
                 for version, at in versions.items()}
 
@@ -144,27 +145,24 @@ class _Reader:
                     '{a: 0, d: 6.6, alpha: 90, offset: 0, type: fixed}', 'key virtual_link')
         own = at.record(('links',), _VERSION)
         place = {**chain, **own}
-        convention = own['convention'].choice(CONVENTIONS) if 'convention' in own else 'standard'
+        convention = _given(own, 'convention', lambda at: at.choice(CONVENTIONS), 'standard')
+        root_frame = place['root_frame'].name('a frame id', FRAME_ID)
         joint_names = self._joint_names(place['joints'])
         links = self._links(Field(at.file, at.where, own['links'].node), joint_names)
-        root_frame = place['root_frame'].name('a frame id', FRAME_ID)
-        try:
-            return Chain(
-                name=name,
-                version=version,
-                root_frame=root_frame,
-                tip=tip,
-                joint_names=joint_names,
-                links=standard_rows(links) if convention == 'modified' else tuple(links),
-                T_root_0=self._optional_transform(own, 'T_Ro0'),
-                tip_frames=self._tip_frames(place['tip_frames'], root_frame),
-                T_n_tip=self._optional_transform(own, 'T_nIs'),
-                convention=convention,
-                root_axes=self._root_axes(place['root_axes']) if 'root_axes' in place else (),
-                source=own['source'].text() if 'source' in own else '',
-            )
-        except LegFKError as error:
-            own['links'].fail('rows and joints that fit each other', str(error))
+        return Chain(
+            name=name,
+            version=version,
+            root_frame=root_frame,
+            tip=tip,
+            joint_names=joint_names,
+            links=standard_rows(links) if convention == 'modified' else tuple(links),
+            T_root_0=_given(own, 'T_Ro0', self._transform, np.eye(4)),
+            tip_frames=self._tip_frames(place['tip_frames'], root_frame),
+            T_n_tip=_given(own, 'T_nIs', self._transform, np.eye(4)),
+            convention=convention,
+            root_axes=_given(place, 'root_axes', self._root_axes, ()),
+            source=_given(own, 'source', Field.text, ''),
+        )
 
     def _joint_names(self, at: Field) -> tuple[str, ...]:
         joints: list[str] = []
@@ -192,8 +190,8 @@ class _Reader:
             if frame_id == root_frame:
                 fields['frame'].fail('another frame id than the root frame')
             frames[name] = TipFrame(
-                frame_id, self._optional_transform(fields, 'transform'),
-                self._outline(fields['outline']) if 'outline' in fields else None)
+                frame_id, _given(fields, 'transform', self._transform, np.eye(4)),
+                _given(fields, 'outline', self._outline, None))
         if not frames:
             at.fail('at least one tip frame', 'none')
         return frames
@@ -212,6 +210,9 @@ class _Reader:
         links = []
         has_range: set[str] = set()
         for index, row in enumerate(at.items('a list of rows')):
+            self._rows_read += 1
+            if self._rows_read > _MOST_ROWS:
+                at.fail(f'at most {_MOST_ROWS} in a file', 'too many rows')
             link = self._link(row.at(f'row {index}'), joint_names, has_range)
             links.append(link)
         named = {link.joint for link in links if link.joint}
@@ -228,31 +229,26 @@ class _Reader:
             if row.has(other):
                 row.fail(f'{name} instead', f'key {other}')
         fields = row.record(('a', 'd', 'alpha'), _ROW)
-        joint_type = fields['type'].choice(JOINT_TYPES) if 'type' in fields else 'revolute'
+        joint_type = _given(fields, 'type', lambda at: at.choice(JOINT_TYPES), 'revolute')
         for name in _OF_A_JOINT:
             if joint_type == 'fixed' and name in fields:
                 fields[name].fail('nothing, since a fixed row has no joint')
-        joint = fields['joint'].choice(tuple(joint_names)) if 'joint' in fields else ''
+        joint = _given(fields, 'joint', lambda at: at.choice(tuple(joint_names)), '')
         self._check_follower(fields, joint, has_range)
         slides = joint_type == 'prismatic'
-        lower, upper = -math.inf, math.inf
-        if 'range' in fields:
-            lower, upper = self._range(fields['range'], slides)
-        robot_range = None
-        if 'robot_range' in fields:
-            robot_range = self._range(fields['robot_range'], slides)
+        lower, upper = _given(fields, 'range', lambda at: self._range(at, slides), _NO_RANGE)
         return DHLink(
             a=self._metres(fields['a']),
             d=self._metres(fields['d']),
             alpha=self._radians(fields['alpha']),
-            offset=self._radians(fields['offset']) if 'offset' in fields else 0.0,
+            offset=_given(fields, 'offset', self._radians, 0.0),
             joint_type=joint_type,
-            gain=self._gain(fields['gain']) if 'gain' in fields else 1.0,
+            gain=_given(fields, 'gain', self._gain, 1.0),
             joint=joint,
             lower=lower,
             upper=upper,
-            robot_range=robot_range,
-            erratum=fields['erratum'].text() if 'erratum' in fields else '')
+            robot_range=_given(fields, 'robot_range', lambda at: self._range(at, slides), None),
+            erratum=_given(fields, 'erratum', Field.text, ''))
 
     def _check_follower(self, fields: Mapping[str, Field], joint: str, seen: set[str]) -> None:
         """Refuse a range on another row than the first that its joint moves."""
@@ -295,13 +291,13 @@ class _Reader:
             return angle
         value = at.number(f'{self._angle}, or as in pi/2')
         if self._angle == 'deg':
+            if _is_rounded_fraction_of_pi(at.node.value):
+                self._warn(at, f'{value:g} deg is unlikely, since it is a fraction of pi; the '
+                               'unit of angle is deg')
             return math.radians(value)
         if abs(value) > 2 * math.pi + 1e-3:
             self._warn(at, f'{value:g} rad is unlikely; the unit of angle is rad')
         return value
-
-    def _optional_transform(self, fields: Mapping[str, Field], name: str) -> Array:
-        return self._transform(fields[name]) if name in fields else np.eye(4)
 
     def _transform(self, at: Field) -> Array:
         T = np.eye(4)
@@ -322,3 +318,19 @@ class _Reader:
 
     def _warn(self, at: Field, text: str) -> None:
         self.warnings.append(f'{at.file}:{at.line}: {at.where}: {text}')
+
+
+def _is_rounded_fraction_of_pi(text: str) -> bool:
+    """Return whether a number is pi/12, or a few times that, as people round radians."""
+    decimals = len(text.partition('.')[2])
+    part = math.pi / 2 if decimals == 2 else math.pi / 12
+    times = round(float(text) / part)
+    if not 2 <= decimals <= 8 or not 0 < abs(times) * part < 6.3:
+        return False
+    return round(times * part, decimals) == float(text)
+
+
+def _given(fields: Mapping[str, Field], name: str, read: Callable[[Field], _Value],
+           default: _Default) -> _Value | _Default:
+    """Return what an optional field holds, or a default."""
+    return read(fields[name]) if name in fields else default

@@ -1,6 +1,8 @@
-"""One link of a chain in the standard (distal) Denavit-Hartenberg convention."""
+"""One row of a Denavit-Hartenberg table, and tables in Craig's modified convention."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 import math
 
 from icub_leg_fk.errors import LegFKError
@@ -9,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 JOINT_TYPES = ('revolute', 'prismatic', 'fixed')
+CONVENTIONS = ('standard', 'modified')
 
 
 @dataclass(frozen=True, repr=False)
@@ -24,8 +27,8 @@ class DHLink:
         alpha: link twist [rad].
         offset: joint angle at q = 0 [rad].
         joint_type: `revolute`, `prismatic` or `fixed`.
-        gain: how far the row moves per unit of its joint; -1 for one that counts backward, in m/rad
-            or rad/m for a slide that follows a turn or the other way round.
+        gain: how far the row moves per unit of its joint, such as -1 for one that counts backward;
+            in m/rad for a slide that follows a turn, rad/m the other way round.
         joint: name of the joint that moves the row; empty for the next joint that no row names.
         lower: smallest joint position as printed [rad or m]; -inf if none is.
         upper: largest joint position as printed [rad or m]; inf if none is.
@@ -57,6 +60,8 @@ class DHLink:
             object.__setattr__(self, name, value)
         if self.gain == 0.0:
             raise LegFKError('gain is 0; allowed: a number that moves the row')
+        if self.is_fixed and self.joint:
+            raise LegFKError(f'joint of a fixed row is {self.joint!r}; allowed: none')
         for lower, upper in ((self.lower, self.upper), self.limits):
             if not lower <= upper:
                 raise LegFKError(f'range is {lower} .. {upper}; allowed: lower <= upper')
@@ -82,32 +87,85 @@ class DHLink:
         return self.limits != (-math.inf, math.inf)
 
     def transform(self, q: ArrayLike = 0.0) -> Array:
-        """Return A_i, the (..., 4, 4) transform from this link's frame to the one before it.
+        """Return A_i, the (..., 4, 4) transform from this row's frame to the one before it.
 
         Args:
             q: (...) joint positions [rad or m]; without effect on a fixed row.
         """
+        return self._along_z(q) @ self._along_x + 0.0  # no negative zeros
+
+    def modified_transform(self, q: ArrayLike = 0.0) -> Array:
+        """Return Rx(alpha) Tx(a) Rz(theta) Tz(d), the transform in the modified convention.
+
+        Args:
+            q: (...) joint positions [rad or m]; without effect on a fixed row.
+        """
+        return self._along_x @ self._along_z(q) + 0.0
+
+    def _along_z(self, q: ArrayLike) -> Array:
+        """Return Rz(theta) Tz(d), (..., 4, 4)."""
         moved = self.gain * np.asarray(q, dtype=float)
-        theta, d = np.full_like(moved, self.offset), np.full_like(moved, self.d)
+        T = np.zeros((*moved.shape, 4, 4))
+        T[..., 2, 2] = T[..., 3, 3] = 1.0
+        theta: ArrayLike = self.offset
+        T[..., 2, 3] = self.d
         if self.is_prismatic:
-            d = d + moved
+            T[..., 2, 3] += moved
         elif not self.is_fixed:
-            theta = theta + moved
-        ct, st = cos_sin(theta)
-        ca, sa = cos_sin(self.alpha)
-        A = np.zeros((*moved.shape, 4, 4))
-        A[..., 0, 0], A[..., 0, 1], A[..., 0, 2], A[..., 0, 3] = ct, -st * ca, st * sa, self.a * ct
-        A[..., 1, 0], A[..., 1, 1], A[..., 1, 2], A[..., 1, 3] = st, ct * ca, -ct * sa, self.a * st
-        A[..., 2, 1], A[..., 2, 2], A[..., 2, 3] = sa, ca, d
-        A[..., 3, 3] = 1.0
-        return A + 0.0  # no negative zeros for the eye to stumble over
+            theta = self.offset + moved
+        cosine, sine = cos_sin(theta)
+        T[..., 0, 0] = T[..., 1, 1] = cosine
+        T[..., 1, 0] = sine
+        T[..., 0, 1] = -sine
+        return T
+
+    @cached_property
+    def _along_x(self) -> Array:
+        """The (4, 4) transform Tx(a) Rx(alpha)."""
+        c, s = cos_sin(self.alpha)
+        return np.array([[1, 0, 0, self.a], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1]])
 
     def __repr__(self) -> str:
-        words = [f'{name}={getattr(self, name):.6g}' for name in ('a', 'd', 'alpha', 'offset')]
+        words = [f'{name}={getattr(self, name):.5g}' for name in ('a', 'd', 'alpha', 'offset')]
         if self.joint_type != 'revolute':
             words.append(self.joint_type)
         if self.gain != 1.0:
-            words.append(f'gain={self.gain:.6g}')
+            words.append(f'gain={self.gain:.5g}')
         if self.joint:
-            words.append(f'joint={self.joint[:30]!r}')
+            words.append(f'joint={self.joint[:12]!r}')
         return f'DHLink({", ".join(words)})'
+
+
+def standard_rows(rows: Sequence[DHLink]) -> tuple[DHLink, ...]:
+    """Return rows of the modified convention (Craig, Introduction to Robotics, 1986) as standard.
+
+    There A_i = Rx(alpha) Tx(a) Rz(theta) Tz(d), with a and alpha before the joint instead of
+    after it. So each standard row takes them from the next one, and those of the first become a
+    fixed row of their own, if they are not 0.
+    """
+    links = []
+    for row, following in zip(rows, [*rows[1:], None], strict=True):
+        a, alpha = (following.a, following.alpha) if following else (0.0, 0.0)
+        links.append(replace(row, a=a, alpha=alpha))
+    first = rows[0]
+    if first.a or first.alpha or _is_before_first(links[0]):
+        links.insert(0, DHLink(a=first.a, d=0.0, alpha=first.alpha, joint_type='fixed'))
+    return tuple(links)
+
+
+def modified_rows(links: Sequence[DHLink]) -> tuple[DHLink, ...]:
+    """Return rows that `standard_rows` made as they were in the modified convention."""
+    a = alpha = 0.0
+    if _is_before_first(links[0]):
+        a, alpha = links[0].a, links[0].alpha
+        links = links[1:]
+    rows = []
+    for link in links:
+        rows.append(replace(link, a=a, alpha=alpha))
+        a, alpha = link.a, link.alpha
+    return tuple(rows)
+
+
+def _is_before_first(link: DHLink) -> bool:
+    """Return whether a first row has nothing but the a and alpha of a first modified row."""
+    return link.is_fixed and link.d == link.offset == 0.0

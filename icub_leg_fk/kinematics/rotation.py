@@ -1,16 +1,16 @@
 """Rotations: unit quaternions in ROS order (x, y, z, w), and exact right angles."""
 
 import math
+import reprlib
 
+from icub_leg_fk.errors import LegFKError
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
-_COSINES = np.array((1.0, 0.0, -1.0, 0.0))  # after 0, 1, 2 and 3 right angles
-_SINES = np.array((0.0, 1.0, 0.0, -1.0))
-_ROUNDING = 1e-15  # relative; an angle this near to a right one differs by rounding alone
-_MOST_RIGHT_ANGLES = 8  # beyond two turns such a relative difference is more than rounding
+_ROUNDING = 2e-15  # what cosine and sine may be off at right angles within two turns
+_EXACT = 1e-15  # below it an entry of a rotation matrix is 0 but for rounding
 _LIKELY = 1e-6  # components of a unit quaternion that differ by less may be equal but for rounding
 
 
@@ -20,15 +20,12 @@ def cos_sin(angle: ArrayLike) -> tuple[Array, Array]:
     DH tables are full of right angles; cos(pi/2) must be 0 there and not 6e-17.
     """
     theta = np.asarray(angle, dtype=float)
-    right_angles = theta / (math.pi / 2)
-    nearest = np.rint(right_angles)
-    apart = np.abs(right_angles - nearest)
-    is_near = apart < _ROUNDING * np.maximum(1.0, np.abs(nearest))
-    is_right = is_near & (np.abs(nearest) <= _MOST_RIGHT_ANGLES)
-    quadrant = np.where(is_right, nearest, 0.0).astype(int) % 4
-    cosine = np.where(is_right, _COSINES[quadrant], np.cos(theta))
-    sine = np.where(is_right, _SINES[quadrant], np.sin(theta))
-    return cosine, sine
+    cosine, sine = np.cos(theta), np.sin(theta)
+    return _without_rounding(cosine), _without_rounding(sine)
+
+
+def _without_rounding(values: Array) -> Array:
+    return np.where(np.abs(values) < _ROUNDING, 0.0, values)[()]  # a float for a float
 
 
 def matrix_to_quaternion(rotation: ArrayLike) -> Array:
@@ -64,6 +61,15 @@ def matrix_to_quaternion(rotation: ArrayLike) -> Array:
     return np.asarray(np.where(q[..., 3:] < 0, -q, q) + 0.0)
 
 
+def quaternion_to_matrix(quaternion: ArrayLike) -> Array:
+    """Return the (3, 3) rotation of a (4,) unit quaternion x, y, z, w."""
+    x, y, z, w = np.asarray(quaternion, dtype=float).tolist()
+    return np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+
+
 def reference_quaternion(quaternion: ArrayLike) -> Array:
     """Return the one of q and -q from which the signs of a tip's other orientations are measured.
 
@@ -89,6 +95,20 @@ def turns_about(axis: Array, angle: ArrayLike) -> Array:
     return np.asarray(np.eye(3) + sin * K + (1 - cos) * (K @ K))
 
 
+def roll_pitch_yaw(R: Array) -> Array:
+    """Return the (3,) angles [rad] of a (3, 3) rotation Rz(yaw) Ry(pitch) Rx(roll), as in URDF.
+
+    The yaw is taken out before the other two angles are read off, so they are as accurate at
+    pitch = pi/2, where any yaw would do and 0 is taken, as elsewhere.
+    """
+    is_upright = math.hypot(R[0, 0], R[1, 0]) < _EXACT
+    yaw = 0.0 if is_upright else math.atan2(R[1, 0], R[0, 0])
+    c, s = math.cos(yaw), math.sin(yaw)
+    pitch = math.atan2(-R[2, 0], c * R[0, 0] + s * R[1, 0])
+    roll = math.atan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
+    return np.array([roll, pitch, yaw])
+
+
 def angle_between(one: Array, two: Array) -> Array:
     """Return the (...) angles [rad] between (..., 3, 3) rotations, exact also where small."""
     # |R1 - R2| is 2 sqrt(2) sin(angle / 2).
@@ -96,21 +116,42 @@ def angle_between(one: Array, two: Array) -> Array:
     return np.asarray(2 * np.arcsin(np.minimum(chord, 1.0)))
 
 
+def rigid_transform(T: ArrayLike, name: str) -> Array:
+    """Return a (4, 4) rigid transform in float64, its rotation corrected if it was rounded.
+
+    Args:
+        T: the matrix.
+        name: what it is called in an error.
+
+    Raises:
+        LegFKError: it is none; shows it.
+    """
+    try:
+        matrix = np.array(T, dtype=float)
+    except (TypeError, ValueError):
+        matrix = np.empty(0)
+    if not is_rigid_transform(matrix):
+        found = reprlib.repr(' '.join(str(T).split()))
+        raise LegFKError(f'{name} is {found}; allowed: a (4, 4) rotation and translation with '
+                         'the last row 0 0 0 1')
+    matrix[:3, :3] = nearest_rotation(matrix[:3, :3])
+    return matrix
+
+
 def is_rigid_transform(T: Array, tolerance: float = 1e-6) -> bool:
-    """Tell whether a (4, 4) matrix is a proper rotation and a translation, and nothing else.
+    """Return whether a matrix is a proper rotation and a translation, and nothing else.
 
     Args:
         T: the matrix.
         tolerance: how far R R^T may be from the identity.
     """
+    if T.shape != (4, 4) or not np.isfinite(T).all():
+        return False
     R = T[:3, :3]
-    return bool(
-        np.all(np.isfinite(T))
-        and np.array_equal(T[3], (0, 0, 0, 1))
-        and np.all(np.abs(R) < 2)  # larger ones may overflow below
-        and np.allclose(R @ R.T, np.eye(3), atol=tolerance)
-        and np.linalg.det(R) > 0
-    )
+    if np.abs(R).max() >= 2.0:  # larger ones may overflow below
+        return False
+    is_orthogonal = np.allclose(R @ R.T, np.eye(3), atol=tolerance)
+    return bool(is_orthogonal and np.linalg.det(R) > 0 and np.array_equal(T[3], (0, 0, 0, 1)))
 
 
 def nearest_rotation(R: Array) -> Array:

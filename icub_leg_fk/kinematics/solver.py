@@ -16,6 +16,7 @@ from collections.abc import Callable, Sequence
 import math
 from typing import Any, NamedTuple
 
+from icub_leg_fk.kinematics.chain_text import short
 from icub_leg_fk.kinematics.link import DHLink
 from icub_leg_fk.kinematics.rotation import (
     Array,
@@ -41,6 +42,9 @@ class Pose(NamedTuple):
     qz: float
     qw: float
 
+    def __repr__(self) -> str:
+        return _short_repr(self)
+
 
 class Twist(NamedTuple):
     """Linear [m/s] and angular [rad/s] velocity of a tip in the axes of its root frame."""
@@ -51,6 +55,9 @@ class Twist(NamedTuple):
     wx: float
     wy: float
     wz: float
+
+    def __repr__(self) -> str:
+        return _short_repr(self)
 
 
 class _Row(NamedTuple):
@@ -66,6 +73,13 @@ class _Row(NamedTuple):
     joint: int
     turn_gain: float
     slide_gain: float
+
+
+def _short_repr(numbers: Pose | Twist) -> str:
+    """Return the numbers by name, with at most six decimals each."""
+    fields = zip(numbers._fields, numbers, strict=True)
+    shown = ', '.join(f'{name}={short(value, 6)}' for name, value in fields)
+    return f'{type(numbers).__name__}({shown})'
 
 
 class Solver:

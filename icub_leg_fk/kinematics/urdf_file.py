@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 import math
 from pathlib import Path
+import re
+import sys
 from typing import NamedTuple, NoReturn
-from xml.etree import ElementTree as ET
 
-from icub_leg_fk.errors import closest, InputFileError
-from icub_leg_fk.kinematics.rotation import Array, turns_about
+from icub_leg_fk.errors import CatalogError, closest, InputFileError, UnknownNameError
+from icub_leg_fk.kinematics.rotation import Array, quaternion_to_matrix, turns_about
+from icub_leg_fk.kinematics.urdf_xml import REPLACEMENT, robot_element, tag
+from lxml import etree
 import numpy as np
 
 MOVING = {'revolute': 'revolute', 'continuous': 'revolute', 'prismatic': 'prismatic'}
@@ -18,50 +22,92 @@ MOVING = {'revolute': 'revolute', 'continuous': 'revolute', 'prismatic': 'prisma
 
 _LARGEST_FILE = 50_000_000  # bytes
 _LARGEST = 1e9  # m or rad; what is larger leaves no room to compute with
-_LISTED = 12  # names in an error
+_MOST_ENDS = 24  # names in an error
+_VERSIONS = ('1.0', '1.1', '1.2')
+_NUMBER = re.compile(r'[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?')
 
 
-class UrdfJoint(NamedTuple):
-    """A joint of a URDF.
+class JointElement(NamedTuple):
+    """A joint as it stands in the file; only what is on a way is looked at more closely.
 
     Attributes:
         name: name of the joint.
-        kind: its type, as the URDF has it.
+        kind: its type.
         parent: name of the link before it.
-        child: name of the link behind it.
-        origin: (4, 4) transform from the child to the parent, at q = 0.
-        axis: (3,) unit vector in the child.
-        lower: smallest position [rad or m].
-        upper: largest position [rad or m].
-        mimics: the joint it follows; empty if none.
+        child: name of the link after it.
+        texts: texts by element and attribute, such as `('origin', 'xyz')`.
     """
 
     name: str
     kind: str
     parent: str
     child: str
+    texts: Mapping[tuple[str, str], str]
+
+    def __repr__(self) -> str:
+        return f'<JointElement {self.name[:40]}: {self.kind[:20]}>'
+
+
+class UrdfJoint(NamedTuple):
+    """A joint on the way from a root to a tip.
+
+    It is at `gain` times the position of the joint that moves it, plus `offset`.
+
+    Attributes:
+        name: name of the joint.
+        kind: `revolute` or `prismatic`, as in a table, or `fixed`.
+        origin: (4, 4) transform from the link after it to the link before it, at position 0.
+        axis: (3,) unit vector in the link after it; 0 for a fixed one.
+        moved_by: the joint that moves it, which is another one if it mimics that.
+        gain: 1 if it moves by itself.
+        offset: its position where the joint that moves it is at 0 [rad or m].
+        lower: smallest position of the joint that moves it [rad or m].
+        upper: largest position of the joint that moves it [rad or m].
+    """
+
+    name: str
+    kind: str
     origin: Array
     axis: Array
-    lower: float
-    upper: float
-    mimics: str
+    moved_by: str = ''
+    gain: float = 1.0
+    offset: float = 0.0
+    lower: float = -math.inf
+    upper: float = math.inf
+
+    @property
+    def moves(self) -> bool:
+        """Whether a table has a joint here."""
+        return bool(self.moved_by)
+
+    def motion(self, position: Array) -> Array:
+        """Return the (N, 4, 4) motions about or along the axis for (N,) positions [rad or m]."""
+        T = np.tile(np.eye(4), (len(position), 1, 1))
+        if self.kind == 'prismatic':
+            T[:, :3, 3] = position[:, None] * self.axis
+        else:
+            T[:, :3, :3] = turns_about(self.axis, position)
+        return T
+
+    def __repr__(self) -> str:
+        return f'<UrdfJoint {self.name[:40]}: {self.kind}>'
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Urdf:
     """The kinematics of a URDF.
 
     Attributes:
-        file: its path.
+        file: its path, or what else it is called in an error.
         name: name of the robot.
         links: names of all links.
-        joints: the joint that leads to each link, by the link's name.
+        joints: every joint, in the order of the file.
     """
 
     file: str
     name: str
     links: tuple[str, ...]
-    joints: Mapping[str, UrdfJoint]
+    joints: tuple[JointElement, ...]
 
     @classmethod
     def load(cls, path: str | Path) -> Urdf:
@@ -70,48 +116,110 @@ class Urdf:
         Raises:
             InputFileError: it cannot be read or is not a URDF; says why.
         """
-        return _read(path)
+        file = str(path) if str(path).isprintable() else repr(str(path))
+        return cls.parse(_bytes(file, path), file)
 
-    def path(self, root: str, tip: str) -> tuple[UrdfJoint, ...]:
-        """Return the joints from a link down to another.
+    @classmethod
+    def parse(cls, data: bytes, file: str) -> Urdf:
+        """Return what a URDF says.
+
+        Args:
+            data: the URDF, maybe as `ros2 topic echo` or `ros2 param get` prints it.
+            file: what it is called in an error.
 
         Raises:
-            InputFileError: there is no such link or no such way, or a joint on it cannot be
-                described by a table.
+            InputFileError: it is not a URDF; says why.
         """
-        for link in (root, tip):
-            if link not in self.links:
-                guess = closest(link, self.links) or next(
-                    (name for name in self.links if link.casefold() in name.casefold()), None)
-                shown = ', '.join(self.links[:_LISTED])
-                more = ' and more' if len(self.links) > _LISTED else ''
-                raise InputFileError(f'{self.file}: unknown link {link!r}; '
-                                     + (f'did you mean {guess!r}? ' if guess else '')
-                                     + f'known: {shown}{more}')
-        joints: list[UrdfJoint] = []
-        link = tip
-        while link != root:
-            if link not in self.joints:
-                raise InputFileError(f'{self.file}: link {tip!r} is not below {root!r}; above it '
-                                     f'is {link!r}')
-            joint = self.joints[link]
-            if joint.kind not in (*MOVING, 'fixed'):
-                raise InputFileError(f'{self.file}: joint {joint.name!r} is {joint.kind}; '
-                                     f'allowed between {root!r} and {tip!r}: revolute, '
-                                     'continuous, prismatic, fixed')
-            if joint.mimics:
-                raise InputFileError(f'{self.file}: joint {joint.name!r} mimics {joint.mimics!r}; '
-                                     'a table has joints that move by themselves')
-            joints.insert(0, joint)
-            link = joint.parent
-        return tuple(joints)
+        robot = robot_element(data, file)
+        version = robot.get('version', '1.0')
+        if version not in _VERSIONS:
+            raise InputFileError(file, f'is a URDF of version {version[:20]!r}; allowed: '
+                                       f'{", ".join(_VERSIONS)}')
+        links, joints = [], []
+        for element in robot:
+            if tag(element) == 'link':
+                links.append(element.get('name', ''))
+            elif tag(element) == 'joint':
+                joints.append(_joint_element(element))
+        for kind, names in (('link', links), ('joint', [joint.name for joint in joints])):
+            again = _first_again(names)
+            if again is not None:
+                raise InputFileError(file, f'has two {kind}s of the name {again!r}; allowed: each '
+                                           f'{kind} once')
+        return cls(file, robot.get('name', ''), tuple(links), tuple(joints))
+
+    def root(self) -> str:
+        """Return the link that poses are given in if no other is named.
+
+        Raises:
+            InputFileError: there is no `root_link`, and not one link alone at the top.
+        """
+        if 'root_link' in self.links:
+            return 'root_link'
+        children = {joint.child for joint in self.joints}
+        tops = [link for link in self.links if link not in children]
+        if len(tops) != 1:
+            shown = ', '.join(tops[:_MOST_ENDS]) or 'none'
+            self._fail(f'has {len(tops)} links at the top ({shown}); allowed: one, or a root link '
+                       'that is named')
+        return tops[0]
+
+    def ends(self) -> tuple[str, ...]:
+        """Return the links that nothing hangs on."""
+        parents = {joint.parent for joint in self.joints}
+        return tuple(link for link in self.links if link not in parents)
+
+    def check_link(self, link: str) -> None:
+        """Refuse a link that is not there.
+
+        Raises:
+            UnknownNameError: lists the links at the ends.
+        """
+        if link in self._links:
+            return
+        ends = self.ends()[:_MOST_ENDS]
+        guess = closest(link, self.links)
+        if guess is None:
+            guess = next((name for name in self.links if link.casefold() in name.casefold()), None)
+        advice = f'did you mean {guess!r}?' if guess and guess not in ends else ''
+        raise UnknownNameError(f'link of {self.file}', link, ends, advice)
+
+    def path(self, root: str, tip: str) -> tuple[UrdfJoint, ...]:
+        """Return the joints from one link to another.
+
+        The way goes down, after it has gone up over fixed joints where the tip is not below the
+        root; those are the other way round then.
+
+        Raises:
+            UnknownNameError: there is no such link; lists those at the ends.
+            InputFileError: there is no such way, or a joint on it cannot be described by a table.
+        """
+        self.check_link(root)
+        self.check_link(tip)
+        down = self._way_up(tip, {root})
+        passed = [tip, *(joint.parent for joint in down)]
+        up = [] if passed[-1] == root else self._way_up(root, {*passed})
+        turn = up[-1].parent if up else root
+        if turn not in passed:
+            self._fail(f'link {tip!r} is not below {root!r}; above it is {passed[-1]!r}')
+        path = []
+        for element in up:
+            joint = self._checked(element)
+            if joint.kind != 'fixed':
+                self._fail(f'link {tip!r} is not below {root!r}, and joint {joint.name!r} above '
+                           f'{root!r} moves')
+            origin = np.asarray(np.linalg.inv(joint.origin))
+            path.append(joint._replace(origin=origin))
+        for element in reversed(down[:passed.index(turn)]):
+            path.append(self._checked(element))
+        return tuple(path)
 
     def forward(self, root: str, tip: str, positions: Mapping[str, Array]) -> Array:
         """Return T_root_tip, multiplied out joint by joint.
 
         Args:
             root: name of a link.
-            tip: name of a link below it.
+            tip: name of another link.
             positions: (N,) positions by joint [rad or m]; those of others are 0.
 
         Returns:
@@ -121,108 +229,188 @@ class Urdf:
         T = np.broadcast_to(np.eye(4), (n, 4, 4))
         for joint in self.path(root, tip):
             T = T @ joint.origin
-            if joint.kind in MOVING and joint.name in positions:
-                T = T @ _motion(joint, positions[joint.name])
+            if joint.moves:
+                master = positions.get(joint.moved_by, np.zeros(n))
+                T = T @ joint.motion(joint.gain * np.asarray(master) + joint.offset)
         return T
 
+    @cached_property
+    def _links(self) -> frozenset[str]:
+        return frozenset(self.links)
 
-def _motion(joint: UrdfJoint, q: Array) -> Array:
-    """Return the (N, 4, 4) motion of a joint: about its axis or along it."""
-    T = np.tile(np.eye(4), (len(q), 1, 1))
-    if joint.kind == 'prismatic':
-        T[:, :3, 3] = q[:, None] * joint.axis
+    @cached_property
+    def _joints_by_name(self) -> dict[str, JointElement]:
+        return {joint.name: joint for joint in self.joints}
+
+    @cached_property
+    def _joints_above(self) -> dict[str, list[JointElement]]:
+        """The joints that lead to each link: one, if the URDF is a tree."""
+        above: dict[str, list[JointElement]] = {}
+        for joint in self.joints:
+            above.setdefault(joint.child, []).append(joint)
+        return above
+
+    def _way_up(self, link: str, ends: set[str]) -> list[JointElement]:
+        """Return the joints above a link, up to one of some links or to the top."""
+        way: list[JointElement] = []
+        passed = {link}
+        while link in self._joints_above and link not in ends:
+            above = self._joints_above[link]
+            if len(above) > 1:
+                self._fail(f'link {link!r} has two parents, joints {above[0].name!r} and '
+                           f'{above[1].name!r}; a URDF is a tree')
+            way.append(above[0])
+            link = above[0].parent
+            if link in passed:
+                self._fail(f'link {link!r} is above itself; a URDF is a tree')
+            passed.add(link)
+        return way
+
+    def _checked(self, joint: JointElement) -> UrdfJoint:
+        """Return a joint of the way with its numbers read, once."""
+        if joint.name not in self._read_joints:
+            self._read_joints[joint.name] = self._read(joint)
+        return self._read_joints[joint.name]
+
+    @cached_property
+    def _read_joints(self) -> dict[str, UrdfJoint]:
+        return {}
+
+    def _read(self, joint: JointElement) -> UrdfJoint:
+        if joint.kind not in (*MOVING, 'fixed'):
+            self._fail(f'joint {joint.name!r} is {joint.kind or "of no type"}; allowed: revolute, '
+                       'continuous, prismatic, fixed')
+        for link in (joint.parent, joint.child):
+            if link not in self._links:
+                self._fail(f'joint {joint.name!r} names the link {link!r}, which is not there')
+        for name in (joint.name, joint.parent, joint.child):
+            if REPLACEMENT in name:
+                self._fail(f'the name {name!r} has a byte that is no text')
+        origin = self._origin(joint)
+        if joint.kind == 'fixed':
+            return UrdfJoint(joint.name, joint.kind, origin, np.zeros(3))
+        axis, kind = self._axis(joint), MOVING[joint.kind]
+        master, gain, offset = self._master(joint)
+        if gain == 0.0:  # it stays where it is
+            still = UrdfJoint(joint.name, kind, origin, axis)
+            T = origin @ still.motion(np.array([offset]))[0]
+            return UrdfJoint(joint.name, 'fixed', T, np.zeros(3))
+        lower, upper = self._limits(master)
+        return UrdfJoint(joint.name, kind, origin, axis, master, gain, offset, lower, upper)
+
+    def _origin(self, joint: JointElement) -> Array:
+        T = np.eye(4)
+        T[:3, 3] = self._numbers(joint, 'origin', 'xyz', '0 0 0')
+        if ('origin', 'quat_xyzw') not in joint.texts:
+            x, y, z = np.eye(3)
+            roll, pitch, yaw = self._numbers(joint, 'origin', 'rpy', '0 0 0')
+            T[:3, :3] = turns_about(z, yaw) @ turns_about(y, pitch) @ turns_about(x, roll)
+            return T
+        if ('origin', 'rpy') in joint.texts:
+            self._fail(f'joint {joint.name!r}: origin has rpy and quat_xyzw; allowed: one of them')
+        quaternion = np.array(self._numbers(joint, 'origin', 'quat_xyzw', '0 0 0 1'))
+        length = float(np.linalg.norm(quaternion))
+        if length < 1e-9:
+            self._fail(f'joint {joint.name!r}: origin quat_xyzw is 0 0 0 0; allowed: a rotation')
+        T[:3, :3] = quaternion_to_matrix(quaternion / length)
         return T
-    T[:, :3, :3] = turns_about(joint.axis, q)
-    return T
+
+    def _axis(self, joint: JointElement) -> Array:
+        axis = np.array(self._numbers(joint, 'axis', 'xyz', '1 0 0'))
+        length = float(np.linalg.norm(axis))
+        if length < 1e-9:
+            self._fail(f'joint {joint.name!r}: axis is 0 0 0; allowed: a direction')
+        return axis / length
+
+    def _master(self, joint: JointElement) -> tuple[str, float, float]:
+        """Return the joint that moves a joint, how far it does, and from where.
+
+        That joint may be in JointState messages only, as robot_state_publisher has it.
+        """
+        gain, offset = 1.0, 0.0
+        name = joint.name
+        passed = [name]
+        while name in self._joints_by_name:
+            joint = self._joints_by_name[name]
+            if not any(element == 'mimic' for element, _ in joint.texts):
+                break
+            multiplier, = self._numbers(joint, 'mimic', 'multiplier', '1')
+            own_offset, = self._numbers(joint, 'mimic', 'offset', '0')
+            offset += gain * own_offset
+            gain *= multiplier
+            name = joint.texts.get(('mimic', 'joint'), '')
+            if not name:
+                self._fail(f'joint {joint.name!r}: mimic has no joint')
+            if name in passed:
+                self._fail(f'joint {name!r} mimics itself, by {" and ".join(passed)}')
+            passed.append(name)
+        return name, gain, offset
+
+    def _limits(self, name: str) -> tuple[float, float]:
+        joint = self._joints_by_name.get(name)
+        if joint is None or joint.kind not in ('revolute', 'prismatic'):
+            return -math.inf, math.inf
+        if ('limit', 'lower') not in joint.texts and ('limit', 'upper') not in joint.texts:
+            return -math.inf, math.inf
+        lower, = self._numbers(joint, 'limit', 'lower', '0')
+        upper, = self._numbers(joint, 'limit', 'upper', '0')
+        if lower > upper:
+            self._fail(f'joint {joint.name!r}: limit lower {lower:g} is above upper {upper:g}')
+        return lower, upper
+
+    def _numbers(self, joint: JointElement, element: str, key: str, default: str) -> list[float]:
+        """Return the numbers of an attribute, as many as its default has."""
+        text = joint.texts.get((element, key), default)
+        words = text.split()
+        count = len(default.split())
+        are_numbers = all(_NUMBER.fullmatch(word) for word in words)
+        if len(words) != count or not are_numbers:
+            self._fail(f'joint {joint.name!r}: {element} {key} is {text[:60]!r}; allowed: {count} '
+                       f'finite number{"s" * (count > 1)}')
+        values = [float(word) for word in words]
+        largest = sys.float_info.max if element == 'limit' else _LARGEST
+        if not all(abs(value) <= largest for value in values):
+            self._fail(f'joint {joint.name!r}: {element} {key} is {text[:60]!r}; allowed: up to '
+                       f'{largest:g}')
+        return values
+
+    def _fail(self, fault: str) -> NoReturn:
+        raise InputFileError(self.file, fault)
+
+    def __repr__(self) -> str:
+        return f'<Urdf {self.name[:40]}: {len(self.links)} links, {len(self.joints)} joints>'
 
 
-def _read(path: str | Path) -> Urdf:
-    file = str(path) if str(path).isprintable() else repr(str(path))
-
-    def fail(text: str) -> NoReturn:
-        raise InputFileError(f'{file}: {text}') from None
-
+def _bytes(file: str, path: str | Path) -> bytes:
     try:
         with open(path, 'rb') as stream:
             data = stream.read(_LARGEST_FILE + 1)
-    except (OSError, ValueError) as error:
-        fail(getattr(error, 'strerror', None) or str(error))
+    except (OSError, ValueError) as error:  # a ValueError for a zero byte in the path
+        reason = getattr(error, 'strerror', None) or str(error)
+        raise CatalogError(file, 0, '', reason.lower(), 'a readable URDF') from None
     if len(data) > _LARGEST_FILE:
-        fail(f'has more than {_LARGEST_FILE} bytes; a URDF is smaller')
-    if b'<!DOCTYPE' in data or b'<!ENTITY' in data:
-        fail('declares a document type or entities, which a URDF has no use for')
-    try:
-        root = ET.fromstring(data)
-    except (ET.ParseError, ValueError, LookupError) as error:
-        fail(f'is not XML: {error}')
-    if any(str(element.tag).startswith('{http') and 'xacro' in str(element.tag)
-           for element in root.iter()):
-        fail('is a xacro file; this makes a URDF of it: xacro '
-             f'{Path(file).name} > robot.urdf')
-    if root.tag != 'robot':
-        fail(f'is not a URDF: its root is <{root.tag[:60]}>; allowed: <robot>')
-    links = tuple(dict.fromkeys(link.get('name', '') for link in root.findall('link')))
-    joints: dict[str, UrdfJoint] = {}
-    for element in root.findall('joint'):
-        joint = _joint(element, fail)
-        for link in (joint.parent, joint.child):
-            if link not in links:
-                fail(f'joint {joint.name!r} names the link {link!r}, which is not there')
-        if joint.child in joints:
-            fail(f'link {joint.child!r} has two parents, joints {joints[joint.child].name!r} and '
-                 f'{joint.name!r}; a URDF is a tree')
-        joints[joint.child] = joint
-    for link in links:
-        seen = {link}
-        while link in joints:
-            link = joints[link].parent
-            if link in seen:
-                fail(f'link {link!r} is above itself; a URDF is a tree')
-            seen.add(link)
-    return Urdf(file, root.get('name', ''), links, joints)
+        raise InputFileError(file, f'has more than {_LARGEST_FILE} bytes; a URDF is smaller')
+    return data
 
 
-def _joint(element: ET.Element, fail: Callable[[str], NoReturn]) -> UrdfJoint:
-    name = element.get('name', '')
+def _joint_element(element: etree._Element) -> JointElement:
+    texts: dict[tuple[str, str], str] = {}
+    seen: set[str] = set()
+    for part in element:
+        name = tag(part)
+        if name not in seen:  # of several the first counts
+            seen.add(name)
+            for key, value in part.items():
+                texts[name, key] = value
+    return JointElement(
+        element.get('name', ''), element.get('type', ''), texts.get(('parent', 'link'), ''),
+        texts.get(('child', 'link'), ''), texts)
 
-    def numbers(tag: str, key: str, default: str, count: int) -> list[float]:
-        found = element.find(tag)
-        text = default if found is None else found.get(key, default)
-        try:
-            values = [float(word) for word in text.split()]
-        except ValueError:
-            values = []
-        if len(values) != count or not all(map(math.isfinite, values)):
-            fail(f'joint {name!r}: {tag} {key} is {text[:60]!r}; allowed: {count} finite '
-                 f'number{"s" * (count > 1)}')
-        if tag in ('origin', 'axis') and max(map(abs, values)) > _LARGEST:
-            fail(f'joint {name!r}: {tag} {key} is {text[:60]!r}; allowed: up to {_LARGEST:g}')
-        return values
 
-    def link(tag: str) -> str:
-        found = element.find(tag)
-        if found is None or not found.get('link'):
-            fail(f'joint {name!r}: no {tag} link')
-        return found.get('link', '')
-
-    kind = element.get('type', '')
-    origin = np.eye(4)
-    x, y, z = np.eye(3)
-    roll, pitch, yaw = numbers('origin', 'rpy', '0 0 0', 3)
-    origin[:3, :3] = turns_about(z, yaw) @ turns_about(y, pitch) @ turns_about(x, roll)
-    origin[:3, 3] = numbers('origin', 'xyz', '0 0 0', 3)
-    axis = np.array(numbers('axis', 'xyz', '1 0 0', 3))
-    length = float(np.linalg.norm(axis))
-    if kind in MOVING and length < 1e-9:
-        fail(f'joint {name!r}: axis is 0 0 0; allowed: a direction')
-    lower, upper = -math.inf, math.inf
-    if kind in ('revolute', 'prismatic') and element.find('limit') is not None:
-        lower, = numbers('limit', 'lower', '0', 1)
-        upper, = numbers('limit', 'upper', '0', 1)
-        if lower > upper:
-            fail(f'joint {name!r}: limit lower {lower:g} is above '
-                 f'upper {upper:g}')
-    mimic = element.find('mimic')
-    return UrdfJoint(name, kind, link('parent'), link('child'), origin,
-                     axis / length if length else axis, lower, upper,
-                     '' if mimic is None else mimic.get('joint', '?'))
+def _first_again(names: list[str]) -> str | None:
+    seen = set()
+    for name in names:
+        if name in seen:
+            return name
+        seen.add(name)
+    return None

@@ -214,7 +214,7 @@ def _read(file: str, path: str | Path) -> bytes:
             data = stream.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:  # a ValueError for a zero byte in the path
         reason = getattr(error, 'strerror', None) or str(error)
-        raise CatalogError(file, 0, '', reason, 'a readable kinematics file') from None
+        raise CatalogError(file, 0, '', reason.lower(), 'a readable kinematics file') from None
     if len(data) > MAX_BYTES:
         _fail(file, 0, f'more than {MAX_BYTES} bytes', f'at most {MAX_BYTES} bytes')
     return data

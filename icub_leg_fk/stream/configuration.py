@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from icub_leg_fk.errors import LegFKError, ParameterError, UnknownNameError
+from icub_leg_fk.errors import LegFKError, ParameterError, UnknownNameError, VersionNeededError
 from icub_leg_fk.kinematics import Catalog, Chain
 
 LEGS = ('left_leg', 'right_leg')
@@ -24,11 +24,11 @@ class Configuration:
         notes: what a user should know of this choice, one line each.
         warnings: what is doubtful in the kinematics file, one line each.
         frame_prefix: put before every frame id.
-        joint_timeout: greatest age of a joint beside the newest of its chain [s]; 0 is none.
+        joint_timeout: how far a joint may lag the newest of its chain [s]; 0 is no limit.
         stamp_now: whether poses are stamped with the present time instead of the message's.
-        publish_tf: whether transforms are sent.
-        publish_twist: whether twists are sent.
-        publish_markers: whether skeletons are sent.
+        publish_tf: whether the poses are sent as transforms, too.
+        publish_twist: whether the velocities of the tips are sent, too.
+        publish_markers: whether the skeletons are sent, too.
     """
 
     chains: tuple[Chain, ...]
@@ -42,30 +42,29 @@ class Configuration:
     publish_markers: bool
 
     @classmethod
-    def checked(cls, catalog: Catalog, *, chains: Sequence[str] | None = LEGS, version: str = '',
+    def checked(cls, catalog: Catalog, *, chains: Sequence[str] = LEGS, version: str = '',
                 foot_frame: str = DEFAULT_FRAME, frame_prefix: str = '',
                 joint_timeout: float = DEFAULT_TIMEOUT, stamp_source: str = STAMP_SOURCES[0],
                 publish_tf: bool = False, publish_twist: bool = False,
                 publish_markers: bool = False) -> Configuration:
         """Return the configuration of some values, which are those of the node's parameters.
 
+        `version` is that of every chain which is named without one, their defaults if empty. A
+        chain that has one frame only gives that, whatever `foot_frame` is; `dh` also stands for
+        the first frame of a chain that has none of this name.
+
         Raises:
             ParameterError: a value cannot be used; names the parameter, what was found and what
                 is allowed.
         """
-        selected = _select(catalog, chains or (), version)
+        selected = _selected(catalog, chains, version)
+        framed = tuple(_in_frame(chain, foot_frame) for chain in selected)
         _check_choice('stamp_source', stamp_source, STAMP_SOURCES)
-        if not 0.0 <= joint_timeout <= LONGEST_TIMEOUT:
-            raise ParameterError('joint_timeout', f'found {joint_timeout}, allowed: 0 to '
-                                 f'{LONGEST_TIMEOUT:g} s, 0 is none')
-        if not frame_prefix.isprintable() or ' ' in frame_prefix or frame_prefix.startswith('/'):
-            raise ParameterError('frame_prefix', f'found {frame_prefix!r}, allowed: printable '
-                                 'characters other than space, and no leading slash, which tf2 '
-                                 'cannot look up')
-        framed, notes = _in_frame(selected, foot_frame, frame_prefix)
+        _check_timeout(joint_timeout)
+        _check_prefix(frame_prefix)
         return cls(
             chains=framed,
-            notes=notes,
+            notes=_notes(framed, foot_frame, frame_prefix),
             warnings=catalog.warnings,
             frame_prefix=frame_prefix,
             joint_timeout=joint_timeout,
@@ -75,9 +74,11 @@ class Configuration:
             publish_markers=publish_markers)
 
 
-def _select(catalog: Catalog, names: Sequence[str], version: str) -> tuple[Chain, ...]:
+def _selected(catalog: Catalog, names: Sequence[str], version: str) -> tuple[Chain, ...]:
     try:
         return catalog.select(names, version)
+    except VersionNeededError as error:
+        raise ParameterError('version', str(error)) from error
     except UnknownNameError as error:
         parameter = 'version' if error.name == version else 'chains'
         raise ParameterError(parameter, str(error)) from error
@@ -85,23 +86,35 @@ def _select(catalog: Catalog, names: Sequence[str], version: str) -> tuple[Chain
         raise ParameterError('chains', str(error)) from error
 
 
-def _in_frame(chains: Sequence[Chain], frame: str, prefix: str
-              ) -> tuple[tuple[Chain, ...], tuple[str, ...]]:
-    """Return the chains in a tip frame, and a note on each that lacks it."""
-    known = dict.fromkeys(name for chain in chains for name in chain.tip_frames)
-    if frame != DEFAULT_FRAME:  # which stands for a chain's first, too
-        _check_choice('foot_frame', frame, tuple(known))
-    framed, notes = [], []
-    for chain in chains:
-        if frame in chain.tip_frames:
-            framed.append(chain.with_frame(frame))
-        else:
-            framed.append(chain)
-            notes.append(f'{chain.name} has no {frame} frame; its pose is that of '
-                         f'{prefix}{chain.frame_id}')
-    return tuple(framed), tuple(notes)
+def _in_frame(chain: Chain, frame: str) -> Chain:
+    """Return a chain in a frame of its tip; in the only one, or the first for `dh`, if it must."""
+    if frame in chain.tip_frames:
+        return chain.with_frame(frame)
+    if len(chain.tip_frames) > 1 and frame != DEFAULT_FRAME:
+        _check_choice('foot_frame', frame, tuple(chain.tip_frames))
+    return chain
+
+
+def _notes(chains: Sequence[Chain], frame: str, prefix: str) -> tuple[str, ...]:
+    """Return a line on each chain that has no frame of this name."""
+    without = [chain for chain in chains if chain.frame != frame]
+    return tuple(f'{chain.name} has no {frame} frame; its pose is that of '
+                 f'{prefix}{chain.frame_id}' for chain in without)
 
 
 def _check_choice(parameter: str, value: str, choices: tuple[str, ...]) -> None:
     if value not in choices:
         raise ParameterError(parameter, f'found {value!r}, allowed: {" or ".join(choices)}')
+
+
+def _check_timeout(seconds: float) -> None:
+    if not 0.0 <= seconds <= LONGEST_TIMEOUT:  # so written, NaN is refused, too
+        raise ParameterError('joint_timeout', f'found {seconds}, allowed: 0 to '
+                             f'{LONGEST_TIMEOUT:g} s; 0 turns it off')
+
+
+def _check_prefix(prefix: str) -> None:
+    is_text = prefix.isprintable() and ' ' not in prefix
+    if not is_text or prefix.startswith('/'):
+        raise ParameterError('frame_prefix', f'found {prefix!r}, allowed: printable characters '
+                             'other than space, and no leading slash, which tf2 cannot look up')

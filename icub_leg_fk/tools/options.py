@@ -1,36 +1,17 @@
 """What subcommands share: options by their names, and the chains and joint positions they mean."""
 
-from __future__ import annotations
-
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 import math
 import sys
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
-from icub_leg_fk.errors import JointVectorError, LegFKError
-
-if TYPE_CHECKING:
-    from icub_leg_fk.kinematics import Catalog, Chain
+from icub_leg_fk.errors import JointVectorError, LegFKError, UnknownNameError
+from icub_leg_fk.kinematics import Catalog, Chain, ChainEntry
+from icub_leg_fk.stream.configuration import LEGS
 
 LARGEST = 1e9  # of a joint position; beyond it a float's last turn is lost anyway
-
-
-_OPTIONS: dict[str, dict[str, Any]] = {
-    'chain': {'metavar': 'CHAIN', 'help': 'a chain, such as left_leg or left_leg=v1 (leg_fk list shows '
-              'them)'},
-    '--chains': {'metavar': 'CHAIN', 'nargs': '+', 'help': 'chains, such as left_leg or head_imu=v2 (default: both '
-                 'legs)'},
-    '--version': {'metavar': 'VERSION', 'help': "of the tables (default: the file's)"},
-    '--foot-frame': {'metavar': 'FRAME',
-                     'help': "axes of the tip: of the iCub's feet dh, the table's last frame (the "
-                             'default), or sole, x forward, y left, z up'},
-    '--joint-topic': {'metavar': 'TOPIC', 'help': "the bag's topic of joint states (default: "
-                      '/joint_states, or the only one there is)'},
-    '--json': {'action': 'store_true', 'help': 'print JSON, for programs'},
-    '--kinematics-file': {'metavar': 'FILE', 'help': 'a kinematics file, with the DH tables of '
-                          "any robot (default: the iCub's, as shipped)"},
-    '--force': {'action': 'store_true', 'help': 'replace what exists already'}}
 
 
 def add(parser: argparse._ActionsContainer, *names: str) -> None:
@@ -40,14 +21,6 @@ def add(parser: argparse._ActionsContainer, *names: str) -> None:
         action = parser.add_argument(*flags, **_OPTIONS[name])
         if name in _COMPLETERS:
             setattr(action, 'completer', _COMPLETERS[name])  # noqa: B010 (it is argcomplete's)
-
-
-_COMPLETERS: dict[str, Callable[..., list[str]]] = {
-    'chain': lambda parsed_args, **_: [*load_catalog(parsed_args).chains],
-    '--chains': lambda parsed_args, **_: [*load_catalog(parsed_args).chains],
-    '--version': lambda parsed_args, **_: [*dict.fromkeys(
-        version for entry in load_catalog(parsed_args).chains.values()
-        for version in entry.versions)]}
 
 
 def add_output(parser: argparse.ArgumentParser, purpose: str) -> None:
@@ -61,14 +34,19 @@ def add_joint_positions(parser: argparse.ArgumentParser, *, required: bool) -> N
     group = parser.add_mutually_exclusive_group(required=required)
     for unit in ('degrees', 'radians'):
         group.add_argument(
-            f'--{unit}', metavar='Q', nargs='+', type=_joint_position,
+            f'--{unit}',
+            metavar='Q',
+            nargs='+',
+            type=_joint_position,
             help=f'joint positions in {unit}, root to tip; of a prismatic joint always in metres')
 
 
 def number(text: str) -> float:
     """Return the number that a text is; NaN if it is none."""
+    if not text.isascii() or '_' in text:
+        return math.nan
     try:
-        return float(text) if text.isascii() and '_' not in text else math.nan
+        return float(text)
     except ValueError:
         return math.nan
 
@@ -78,20 +56,18 @@ def number_between(low: float, high: float, allowed: str = '') -> Callable[[str]
     def parse(text: str) -> float:
         value = number(text)
         if not low <= value <= high:
-            raise argparse.ArgumentTypeError(f'found {text.strip()!r}, allowed: '
-                                             f'{allowed or f"{low:g} to {high:g}"}')
+            numbers = allowed or f'{low:g} to {high:g}'
+            raise argparse.ArgumentTypeError(f'found {text!r}, allowed: {numbers}')
         return value
     return parse
 
 
-_joint_position = number_between(-LARGEST, LARGEST, f'finite numbers up to {LARGEST:g}, one per '
-                                 'joint')
-
-
 def load_catalog(args: argparse.Namespace) -> Catalog:
-    """Return the catalog that `-k` names; what it warns of is said on stderr."""
-    from icub_leg_fk.kinematics import Catalog
-
+    """Return the catalog that `-k` names, with a line on stderr for each of its warnings."""
+    for option in ('kinematics_file', 'version', 'foot_frame'):
+        if getattr(args, option, None) == '':  # as an unset variable of the shell leaves it
+            words = option.replace('_', '-')
+            raise LegFKError(f'--{words} is empty; leave it out for its default')
     catalog = Catalog.load(args.kinematics_file)
     for line in catalog.warnings:
         print(f'leg_fk: warning: {line}', file=sys.stderr)
@@ -99,18 +75,167 @@ def load_catalog(args: argparse.Namespace) -> Catalog:
 
 
 def load_chain(args: argparse.Namespace) -> tuple[Catalog, Chain]:
-    """Return the catalog, and the chain that its options name."""
+    """Return the catalog, and the chain that the options name."""
     catalog = load_catalog(args)
-    return catalog, catalog.chain(args.chain, args.version, args.foot_frame)
+    with advice_on_chains(catalog):
+        return catalog, catalog.chain(args.chain, args.version, args.foot_frame)
+
+
+def chains_of_one_root(args: argparse.Namespace) -> list[Chain]:
+    """Return the chains asked for, or both legs, or else all of the file.
+
+    Raises:
+        LegFKError: they have several root frames.
+    """
+    catalog = load_catalog(args)
+    legs = [name for name in LEGS if name in catalog.chains]
+    with advice_on_chains(catalog):
+        chains = catalog.select(args.chains or legs or catalog.chains, args.version)
+    roots = sorted({chain.root_frame for chain in chains})
+    if len(roots) > 1:
+        raise LegFKError(f'the chains have the root frames {", ".join(roots)}; allowed: chains of '
+                         'one root frame')
+    if not args.foot_frame:
+        return list(chains)
+    return [chain.with_frame(args.foot_frame) for chain in chains]
+
+
+@contextmanager
+def advice_on_chains(catalog: Catalog) -> Iterator[None]:
+    """Where a tip or a frame is given for a chain, let the error say which chain has it."""
+    try:
+        yield
+    except UnknownNameError as error:
+        owner = _owner(catalog, error.name)
+        if error.kind != 'chain' or not owner:
+            raise
+        raise UnknownNameError(error.kind, error.name, error.choices, owner) from error
 
 
 def joint_positions(args: argparse.Namespace, chain: Chain) -> list[float] | None:
     """Return the joint vector given by `--degrees` or `--radians` [rad or m]; None if none is."""
-    given: Sequence[float] | None = args.radians if args.degrees is None else args.degrees
-    if given is None:
+    given = args.degrees or args.radians
+    if not given:
         return None
     if len(given) != chain.n:
-        raise JointVectorError('joint positions', f'are {len(given)}', f'{chain.n}, in the order '
-                               f'{" ".join(chain.joint_names)}')
-    return [value if args.degrees is None or link.is_prismatic else math.radians(value)
-            for value, link in zip(given, chain.joints, strict=True)]
+        raise JointVectorError('the joint vector', f'has {len(given)} entries',
+                               f'{chain.n}, in the order {" ".join(chain.joint_names)}')
+    if args.radians:
+        _warn_of_degrees(chain, args.radians)
+        return list(args.radians)
+    positions = []
+    for value, link in zip(args.degrees, chain.joints, strict=True):
+        positions.append(value if link.is_prismatic else math.radians(value))
+    return positions
+
+
+def _joint_position(text: str) -> float:
+    if ',' in text:
+        raise argparse.ArgumentTypeError(f'found {text!r}; numbers are separated by spaces, and '
+                                         'their decimals by a point')
+    return _position_in_bounds(text)
+
+
+_position_in_bounds = number_between(
+    -LARGEST, LARGEST, f'finite numbers up to {LARGEST:g}, one per joint')
+
+
+def _warn_of_degrees(chain: Chain, q: list[float]) -> None:
+    """Warn of angles [rad] that are outside their range and more than a turn."""
+    outside = chain.out_of_range(q)
+    doubtful = []
+    for name, link, value in zip(chain.joint_names, chain.joints, q, strict=True):
+        is_turns = not link.is_prismatic and abs(value) > 2 * math.pi
+        if name in outside and is_turns:
+            doubtful.append(f'{name} {value:g}')
+    if doubtful:
+        print(f'leg_fk: warning: positions look like degrees, for which there is --degrees: '
+              f'{", ".join(doubtful)}', file=sys.stderr)
+
+
+def _owner(catalog: Catalog, name: str) -> str:
+    """Return whose tip or frame a name is; nothing if it is neither."""
+    for entry in catalog.chains.values():
+        if name == entry.tip:
+            return f'{name} is the tip of {entry.name}'
+        for chain in entry.versions.values():
+            for frame, tip_frame in chain.tip_frames.items():
+                if name == tip_frame.frame_id:
+                    return f'{name} is {entry.name} with --foot-frame {frame}'
+    return ''
+
+
+def _complete_chain(prefix: str, parsed_args: argparse.Namespace, **_: Any) -> list[str]:
+    """Return the chains, or after an equals sign the versions of one."""
+    catalog = load_catalog(parsed_args)
+    name = prefix.rpartition('=')[0]
+    if name in catalog.chains:
+        return [f'{name}={version}' for version in catalog.chains[name].versions]
+    return list(catalog.chains)
+
+
+def _complete_version(parsed_args: argparse.Namespace, **_: Any) -> list[str]:
+    """Return the versions of the chains typed so far, or of all."""
+    return [version for entry in _typed_chains(parsed_args) for version in entry.versions]
+
+
+def _complete_frame(parsed_args: argparse.Namespace, **_: Any) -> list[str]:
+    """Return the tip frames of the chains typed so far, or of all."""
+    frames: list[str] = []
+    for entry in _typed_chains(parsed_args):
+        for chain in entry.versions.values():
+            frames.extend(chain.tip_frames)
+    return frames
+
+
+def _typed_chains(args: argparse.Namespace) -> list[ChainEntry]:
+    catalog = load_catalog(args)
+    names = [getattr(args, 'chain', None), *(getattr(args, 'chains', None) or [])]
+    chains = [catalog.split(name)[0] for name in names if name]
+    typed = [catalog.chains[chain] for chain in chains if chain in catalog.chains]
+    return typed or list(catalog.chains.values())
+
+
+_COMPLETERS: dict[str, Callable[..., list[str]]] = {
+    'chain': _complete_chain,
+    'chains': _complete_chain,
+    '--chains': _complete_chain,
+    '--version': _complete_version,
+    '--foot-frame': _complete_frame,
+}
+
+_OPTIONS: dict[str, dict[str, Any]] = {
+    'chain': {
+        'metavar': 'CHAIN',
+        'help': 'a chain, such as left_leg or left_leg=v1 (leg_fk list shows them)'},
+    'chains': {
+        'metavar': 'CHAIN',
+        'nargs': '*',
+        'help': 'chains, such as left_leg or head_imu=v2 (default: all that have the version '
+                'asked for, or if none is, that of the first chain)'},
+    '--chains': {
+        'metavar': 'CHAIN',
+        'nargs': '+',
+        'help': 'chains, such as left_leg or head_imu=v2 (default: both legs)'},
+    '--version': {
+        'metavar': 'VERSION',
+        'help': "of the chains named without one (default: the file's)"},
+    '--foot-frame': {
+        'metavar': 'FRAME',
+        'help': "axes of the tip: of the iCub's feet dh, the table's last frame (the default), "
+                'or sole, x forward, y left, z up'},
+    '--joint-topic': {
+        'metavar': 'TOPIC',
+        'help': "the bag's topic of joint states (default: /joint_states, or the only one there "
+                'is)'},
+    '--json': {
+        'action': 'store_true',
+        'help': 'print JSON, for programs'},
+    '--kinematics-file': {
+        'metavar': 'FILE',
+        'help': "a kinematics file, with the DH tables of any robot (default: the iCub's, as "
+                'shipped)'},
+    '--force': {
+        'action': 'store_true',
+        'help': 'replace what exists already'},
+}

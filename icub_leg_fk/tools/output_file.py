@@ -10,6 +10,10 @@ import tempfile
 from icub_leg_fk.errors import OutputFileError
 from icub_leg_fk.tools.signals import held_signals
 
+STANDARD_OUTPUT = '-'
+
+_PART_OF_BAG = re.compile(r'.*\.(mcap|db3)(\.zstd)?(-wal|-shm)?')
+
 
 @contextmanager
 def whole_path(path: str | Path, *, force: bool,
@@ -18,9 +22,12 @@ def whole_path(path: str | Path, *, force: bool,
 
     The work is done in a hidden directory beside the target, of which nothing is left. A target
     that exists is replaced if that is forced, and `may_replace` says that it is of the kind.
+
+    Raises:
+        OutputFileError: the target cannot be written, or must not be.
     """
-    target = Path(os.path.realpath(path))
     check_target(path, force=force, may_replace=may_replace)
+    target = Path(os.path.realpath(path))
     try:
         with tempfile.TemporaryDirectory(prefix=f'.{target.name}.', suffix='.part',
                                          dir=target.parent, ignore_cleanup_errors=True) as work:
@@ -32,26 +39,47 @@ def whole_path(path: str | Path, *, force: bool,
                     target.rename(Path(work, 'replaced'))
                 new.replace(target)
     except OSError as error:
-        raise OutputFileError(f'{path}: {error.strerror or error}') from error
+        raise OutputFileError(str(path), error.strerror or str(error)) from error
 
 
 def check_target(path: str | Path, *, force: bool,
                  may_replace: Callable[[Path], bool] = Path.is_file) -> None:
-    """Refuse a target that `whole_path` would refuse, before any work is done."""
+    """Refuse a target that `whole_path` would refuse, before any work is done.
+
+    Raises:
+        OutputFileError: says why.
+    """
+    refuse_option_like(path)
     target = Path(os.path.realpath(path))
     if not target.parent.is_dir():
-        raise OutputFileError(f'{path}: there is no directory {target.parent}')
-    if os.path.lexists(target):
-        if not may_replace(target):
-            raise OutputFileError(f'{path}: exists already and is something else than what would '
-                                  'be written; nothing replaces it')
-        if not force:
-            raise OutputFileError(f'{path}: exists already; --force replaces it')
+        raise OutputFileError(str(path), f'there is no directory {target.parent}')
+    if not os.path.lexists(target):
+        return
+    if not may_replace(target):
+        raise OutputFileError(str(path), 'exists already and is something else than what would be '
+                                         'written; nothing replaces it')
+    if not force:
+        raise OutputFileError(str(path), 'exists already; --force replaces it')
+
+
+def refuse_option_like(path: str | Path) -> None:
+    """Refuse the name of an output that begins as an option does.
+
+    Raises:
+        OutputFileError: says how such a file can be named all the same.
+    """
+    name = str(path).strip()
+    if name == STANDARD_OUTPUT:
+        raise OutputFileError(name, 'is standard output, which does not take this; allowed: the '
+                                    'name of a file')
+    if name.startswith('-'):
+        raise OutputFileError(name, f'begins with a minus sign, as options do; a file of this '
+                                    f'name is written ./{name}')
 
 
 def write_text(path: str | None, text: str, *, force: bool) -> None:
-    """Write a text file, whole or not at all, or without a path to standard output."""
-    if path is None:
+    """Write a text file, whole or not at all, or to standard output if the path is None or `-`."""
+    if path is None or path == STANDARD_OUTPUT:
         print(text, end='')
         return
     with whole_path(path, force=force) as new:
@@ -65,8 +93,9 @@ def is_bag(path: Path) -> bool:
     if not path.is_dir():
         return path.is_file() and path.suffix in ('.mcap', '.db3')
     entries = list(path.iterdir())
-    others = [entry for entry in entries
-              if not re.search(r'\.(mcap|db3)(\.zstd)?(-wal|-shm)?$', entry.name)]
-    return (all(entry.is_file() and not entry.is_symlink() for entry in entries)
-            and [entry.name for entry in others] == ['metadata.yaml']
-            and b'rosbag2_bagfile_information' in others[0].read_bytes())
+    if any(entry.is_symlink() or not entry.is_file() for entry in entries):
+        return False
+    others = [entry for entry in entries if not _PART_OF_BAG.fullmatch(entry.name)]
+    if [entry.name for entry in others] != ['metadata.yaml']:
+        return False
+    return b'rosbag2_bagfile_information' in others[0].read_bytes()

@@ -12,10 +12,10 @@ import tempfile
 import time
 from typing import Any, IO
 
-from icub_leg_fk.errors import LegFKError, MissingDependencyError
+from icub_leg_fk.errors import LegFKError
 from icub_leg_fk.kinematics.rotation import Array
-from icub_leg_fk.node.main import LOOPBACK_IS_DOWN, loopback_is_up, unusable_domain
 from icub_leg_fk.tools.recording import JointRecording
+from icub_leg_fk.tools.ros import import_ros
 from icub_leg_fk.tools.signals import held_signals
 import numpy as np
 
@@ -23,7 +23,8 @@ DEPTH = 1000  # messages that may wait anywhere when a process is held up
 _DISCOVERY_TIMEOUT = 20.0  # s
 _LAST_POSE_TIMEOUT = 5.0  # s without a pose, after the last message
 _STOP_TIMEOUT = 10.0  # s
-_PROBE, _PROBE_PERIOD = -1, 0.1  # stands for its message's index; s
+_PROBE = -1  # stands for the index of a message that does not count
+_PROBE_PERIOD = 0.1  # s
 _HIGHEST_DOMAIN = 101  # beyond it DDS's ports meet those that Linux hands out
 
 
@@ -33,13 +34,21 @@ class DemoError(LegFKError):
 
 @dataclass
 class Answers:
-    """The poses of one tip, by message; NaN where none has come."""
+    """The poses of one tip, by message; NaN where none has come.
+
+    Attributes:
+        tip: name of the tip.
+        poses: (N, 7) rows x, y, z [m], qx, qy, qz, qw.
+        latencies: (N,) from publishing the message to receiving the pose [s].
+        unexpected: poses that belong to no message, or to one that had a pose.
+        newest: index of the message whose pose came last.
+    """
 
     tip: str
-    poses: Array  # (N, 7) rows x, y, z [m], qx, qy, qz, qw
-    latencies: Array  # (N,) from publishing the message to receiving the pose [s]
-    unexpected: int = 0  # poses that belong to no message, or to one that had a pose
-    newest: int = 0  # index of the message whose pose came last
+    poses: Array
+    latencies: Array
+    unexpected: int = 0
+    newest: int = 0
 
     @property
     def arrived(self) -> int:
@@ -49,8 +58,6 @@ class Answers:
 
 def stay_on_this_machine() -> str:
     """Let DDS reach nobody else; return the ROS_DOMAIN_ID, the user's if there is one."""
-    if fault := unusable_domain():
-        raise LegFKError(fault)
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     os.environ.pop('ROS_STATIC_PEERS', None)
     return os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % _HIGHEST_DOMAIN))
@@ -58,10 +65,12 @@ def stay_on_this_machine() -> str:
 
 def lossless(namespace: str, tips: Iterable[str], depth: int) -> dict[str, str]:
     """Return parameters by which the node loses nothing when a process is held up."""
-    joint_states = f'qos_overrides.{namespace}/joint_states.subscription'
-    return {f'{joint_states}.reliability': 'reliable', f'{joint_states}.depth': str(depth)} | {
-        f'qos_overrides.{namespace}/foot_pose_publisher/{tip}/pose.publisher.depth': str(depth)
-        for tip in tips}
+    subscription = f'qos_overrides.{namespace}/joint_states.subscription'
+    parameters = {f'{subscription}.reliability': 'reliable', f'{subscription}.depth': str(depth)}
+    for tip in tips:
+        pose = f'{namespace}/foot_pose_publisher/{tip}/pose'
+        parameters[f'qos_overrides.{pose}.publisher.depth'] = str(depth)
+    return parameters
 
 
 @contextmanager
@@ -73,8 +82,9 @@ def running_node(namespace: str, parameters: Mapping[str, str],
     In a session of its own Ctrl-C does not reach it. Gives the process, and what raises
     `DemoError` once it has stopped by itself.
     """
-    words = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
-    command = [sys.executable, '-m', *program, '--ros-args', '-r', f'__ns:={namespace}', *words]
+    command = [sys.executable, '-m', *program, '--ros-args', '-r', f'__ns:={namespace}']
+    for name, value in parameters.items():
+        command += ['-p', f'{name}:={value}']
     process: subprocess.Popen[bytes] | None = None
     with tempfile.TemporaryFile() as log:
         try:
@@ -85,61 +95,64 @@ def running_node(namespace: str, parameters: Mapping[str, str],
         finally:
             with held_signals():
                 if process is not None:
-                    process.send_signal(signal.SIGINT)
-                    try:
-                        process.wait(_STOP_TIMEOUT)
-                    except subprocess.TimeoutExpired:
-                        process.kill()
-                        process.wait()
+                    _stop(process)
 
 
 def _check_runs(process: subprocess.Popen[bytes], log: IO[bytes]) -> None:
-    if (status := process.poll()) is not None:
-        log.seek(0)
-        said = log.read().decode(errors='replace').strip() or 'it said nothing'
-        raise DemoError(f'the node stopped with exit status {status}: '
-                        f'{said.splitlines()[-1].strip()}')
+    status = process.poll()
+    if status is None:
+        return
+    log.seek(0)
+    lines = log.read().decode(errors='replace').split('\n')
+    last_words = [line.strip() for line in lines if line.strip()][-1:]
+    raise DemoError(f'the node stopped with exit status {status}: '
+                    f'{"".join(last_words) or "it said nothing"}')
+
+
+def _stop(process: subprocess.Popen[bytes]) -> None:
+    process.send_signal(signal.SIGINT)
+    try:
+        process.wait(_STOP_TIMEOUT)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
 
 
 class Replay:
-    """Publishes joint states in their own timing and collects poses, until it is closed."""
+    """Publishes joint states in their own timing and collects poses, until it is closed.
+
+    Attributes:
+        answers: the poses of each tip.
+        sent: stamp [ns] and bytes of each message sent.
+    """
 
     def __init__(self, recording: JointRecording, namespace: str, tips: Sequence[str]) -> None:
-        try:
-            from geometry_msgs.msg import PoseStamped
-            import rclpy
-            from rclpy.context import Context
-            from rclpy.executors import SingleThreadedExecutor
-            from rclpy.serialization import serialize_message
-            from rclpy.signals import SignalHandlerOptions
-            from sensor_msgs.msg import JointState
-        except ImportError as error:
-            raise MissingDependencyError(f'the demonstration needs rclpy ({error}): source ROS 2, '
-                                         'or pip install icub_leg_fk[ros]') from error
+        rclpy, joint_state, pose_stamped = import_ros('the demonstration')
         count = len(recording.times)
         self.answers = [Answers(tip, np.full((count, 7), np.nan), np.full(count, np.nan))
                         for tip in tips]
-        self.sent: list[tuple[int, bytes]] = []  # stamp [ns] and message
+        self.sent: list[tuple[int, bytes]] = []
         self._recording = recording
         self._awaited: dict[int, tuple[int, float]] = {}  # by stamp: which message, sent when
         self._found: set[str] = set()
-        self._joint_state, self._serialize = JointState, serialize_message
-        self._context = Context()
+        self._joint_state = joint_state
+        self._serialize = rclpy.serialization.serialize_message
+        self._context = rclpy.context.Context()
         try:
             rclpy.init(args=[], context=self._context,
-                       signal_handler_options=SignalHandlerOptions.NO)
+                       signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
             self._node = rclpy.create_node(
                 'leg_fk_demo', namespace=namespace, context=self._context,
                 use_global_arguments=False, enable_rosout=False, start_parameter_services=False)
         except (RuntimeError, ValueError) as error:  # what rclpy raises for what rcl refuses
             raise DemoError(f'ROS 2 cannot be started: {" ".join(str(error).split())}') from error
-        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor = rclpy.executors.SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
-        self._publisher = self._node.create_publisher(JointState, 'joint_states', DEPTH)
+        self._publisher = self._node.create_publisher(joint_state, 'joint_states', DEPTH)
         for answers in self.answers:
-            self._node.create_subscription(
-                PoseStamped, f'foot_pose_publisher/{answers.tip}/pose',
-                partial(self._take, answers), DEPTH)
+            topic = f'foot_pose_publisher/{answers.tip}/pose'
+            take = partial(self._take, answers)
+            self._node.create_subscription(pose_stamped, topic, take, DEPTH)
 
     def close(self) -> None:
         """Leave the ROS graph."""
@@ -157,11 +170,9 @@ class Replay:
             check()
             now = time.monotonic()
             if now > deadline:
-                raise DemoError(f'the node was not found over DDS in {_DISCOVERY_TIMEOUT:g} s' + (
-                    '' if loopback_is_up() else f': {LOOPBACK_IS_DOWN}'))
+                raise DemoError(f'the node was not found over DDS in {_DISCOVERY_TIMEOUT:g} s')
             self._publish(time.time_ns(), _PROBE)
-            while time.monotonic() < now + _PROBE_PERIOD:
-                self._spin(0.02)
+            self._spin_until(now + _PROBE_PERIOD)
 
     def play(self, on_time: Callable[[float], None], period: float, check: Callable[[], None]
              ) -> None:
@@ -170,31 +181,44 @@ class Replay:
         Every `period` seconds, `on_time` is called with the time since the first message [s], and
         `check`, which raises if there is no hope.
         """
-        times = self._recording.times - self._recording.times[0]
+        offsets = (self._recording.times - self._recording.times[0]).tolist()
         start, start_ns = time.monotonic(), time.time_ns()
         next_call = start
-        for index, offset in enumerate(times.tolist()):
-            while (now := time.monotonic()) < start + offset:
-                if now >= next_call:
-                    next_call += period
-                    check()
-                    on_time(now - start)
-                # A negative timeout would be none.
-                self._spin(max(min(start + offset, next_call) - now, 0.0))
+        for index, offset in enumerate(offsets):
+            while next_call < start + offset:
+                self._spin_until(next_call)
+                check()
+                on_time(time.monotonic() - start)
+                next_call += period
+            self._spin_until(start + offset)
             stamp = start_ns + round(offset * 1e9)
             if self.sent:
                 stamp = max(stamp, self.sent[-1][0] + 1)
             self.sent.append((stamp, self._publish(stamp, index)))
-        arrived, deadline = -1, 0.0
-        while (now_arrived := sum(a.arrived for a in self.answers)) < len(times) * len(
-                self.answers):
-            if now_arrived > arrived:
-                arrived, deadline = now_arrived, time.monotonic() + _LAST_POSE_TIMEOUT
-            if time.monotonic() > deadline:
-                break
+        self._wait_for_last_poses(check)
+        on_time(offsets[-1])
+
+    def _wait_for_last_poses(self, check: Callable[[], None]) -> None:
+        expected = len(self.sent) * len(self.answers)
+        arrived = -1
+        deadline = 0.0
+        while arrived < expected:
+            now = time.monotonic()
+            newly_arrived = sum(answers.arrived for answers in self.answers)
+            if newly_arrived > arrived:
+                arrived = newly_arrived
+                deadline = now + _LAST_POSE_TIMEOUT
+            if now > deadline:
+                return
             check()
             self._spin(0.1)
-        on_time(float(times[-1]))
+
+    def _spin_until(self, deadline: float) -> None:
+        """Take what arrives until a time [s, monotonic]."""
+        left = deadline - time.monotonic()
+        while left > 0:
+            self._spin(left)
+            left = deadline - time.monotonic()
 
     def _spin(self, seconds: float) -> None:
         # What a signal raises inside of rclpy it makes another exception of, or loses.
@@ -202,8 +226,10 @@ class Replay:
             self._executor.spin_once(timeout_sec=seconds)
 
     def _take(self, answers: Answers, message: Any) -> None:
-        now, stamp = time.monotonic(), message.header.stamp
-        index, sent = self._awaited.get(stamp.sec * 1_000_000_000 + stamp.nanosec, (None, now))
+        now = time.monotonic()
+        stamp = message.header.stamp
+        nanoseconds = stamp.sec * 1_000_000_000 + stamp.nanosec
+        index, sent = self._awaited.get(nanoseconds, (None, now))
         if index == _PROBE:
             self._found.add(answers.tip)
         elif index is None or not np.isnan(answers.latencies[index]):
@@ -215,8 +241,8 @@ class Replay:
             answers.newest = index
 
     def _publish(self, stamp: int, index: int) -> bytes:
-        message = self._joint_state(name=list(self._recording.joint_names),
-                                    position=self._recording.positions[max(index, 0)].tolist())
+        row = self._recording.positions[max(index, 0)]
+        message = self._joint_state(name=list(self._recording.joint_names), position=row.tolist())
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
         data = bytes(self._serialize(message))
         self._awaited[stamp] = index, time.monotonic()

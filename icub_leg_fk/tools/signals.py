@@ -6,6 +6,10 @@ import signal
 import sys
 import threading
 
+_STOPPING = [signal.SIGTERM]
+if hasattr(signal, 'SIGHUP'):  # Windows has none
+    _STOPPING.append(signal.SIGHUP)
+
 
 @contextmanager
 def stop_on_signals() -> Iterator[None]:
@@ -13,8 +17,7 @@ def stop_on_signals() -> Iterator[None]:
 
     One that is ignored, as `nohup` wants it, stays so.
     """
-    numbers = [number for number in (signal.SIGTERM, signal.SIGHUP)
-               if signal.getsignal(number) != signal.SIG_IGN]
+    numbers = [number for number in _STOPPING if signal.getsignal(number) != signal.SIG_IGN]
     with _handled(numbers, lambda number, frame: sys.exit(128 + number)):
         yield
 
@@ -24,8 +27,7 @@ def held_signals() -> Iterator[None]:
     """While it lasts, the signals that end the process wait."""
     arrived: list[int] = []
     try:
-        with _handled((signal.SIGINT, signal.SIGTERM, signal.SIGHUP),
-                      lambda number, frame: arrived.append(number)):
+        with _handled([signal.SIGINT, *_STOPPING], lambda number, frame: arrived.append(number)):
             yield
     finally:
         if arrived:

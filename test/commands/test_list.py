@@ -1,27 +1,29 @@
 """`leg_fk list`."""
 
 import json
-from pathlib import Path
 
-from support.leg_fk_process import assert_one_line_complaint, leg_fk
+from icub_leg_fk.kinematics import config_file
 import pytest
+from support.leg_fk_process import assert_one_line_complaint, run_main
 
-ARM = Path(__file__).parents[2] / 'config' / 'examples' / 'cylindrical_arm.yaml'
+ARM = config_file('examples/cylindrical_arm.yaml')
 
 
-def test_the_text_names_chains_versions_joints_and_tip_frames():
-    text = leg_fk('list').stdout
+def test_the_text_names_chains_versions_axes_joints_and_tip_frames():
+    text = run_main('list').stdout
     for chain in ('left_leg', 'right_leg', 'head_imu'):
         assert f'\n{chain}\n' in text
     for words in ('l_hip_pitch  l_hip_roll  l_hip_yaw  l_knee  l_ankle_pitch  l_ankle_roll',
-                  'dh: l_foot_dh_frame', 'sole: r_sole', 'dh: imu_frame', 'v2_5'):
+                  'dh: l_foot_dh_frame', 'sole: r_sole', 'dh: imu_frame', 'v2_5  (default)',
+                  'v1, v2_5: x backward, y right, z up', 'v3: x forward, y left, z up'):
         assert words in text
     assert text.count('v3  (iKin, versions from 3.0 on, in the root frame of iCubGenova09') == 2
+    assert text.count('(default)') == 3
     assert max(map(len, text.splitlines()[1:])) <= 100
 
 
 def test_json_holds_the_same():
-    listed = json.loads(leg_fk('list', '--json').stdout)
+    listed = json.loads(run_main('list', '--json').stdout)
     assert set(listed) == {'file', 'chains'}
     chains = {chain['name']: chain for chain in listed['chains']}
     assert list(chains) == ['left_leg', 'right_leg', 'head_imu']
@@ -29,16 +31,21 @@ def test_json_holds_the_same():
     assert set(left) == {'name', 'tip', 'root_frame', 'joints', 'tip_frames', 'versions'}
     assert left['tip_frames'] == {'dh': 'l_foot_dh_frame', 'sole': 'l_sole'}
     assert left['joints'][3] == 'l_knee' and len(left['joints']) == 6
-    assert [version['name'] for version in left['versions']] == ['v1', 'v2_5', 'v3']
-    assert [bool(version['source']) for version in left['versions']] == [False, False, True]
+    v1, v2_5, v3 = left['versions']
+    assert [version['name'] for version in (v1, v2_5, v3)] == ['v1', 'v2_5', 'v3']
+    assert [version['default'] for version in (v1, v2_5, v3)] == [False, True, False]
+    assert [bool(version['source']) for version in (v1, v2_5, v3)] == [False, False, True]
+    assert v2_5['root_axes'] == ['backward', 'right', 'up']
+    assert v3['root_axes'] == ['forward', 'left', 'up']
 
 
 def test_a_file_of_ones_own_is_listed():
     for option in ('-k', '--kinematics-file'):
-        listed = json.loads(leg_fk('list', option, ARM, '--json').stdout)
+        listed = json.loads(run_main('list', option, ARM, '--json').stdout)
         assert listed['file'] == str(ARM)
         (arm,) = listed['chains']
         assert arm['versions'][0]['joint_types'] == ['revolute', 'prismatic', 'prismatic']
+    assert 'axes' not in run_main('list', '-k', ARM).stdout  # of which the file says nothing
 
 
 @pytest.mark.parametrize(('old', 'new', 'complaint'), [
@@ -49,9 +56,4 @@ def test_a_file_of_ones_own_is_listed():
 def test_a_mistake_in_the_file_is_one_line(tmp_path, old, new, complaint):
     file = tmp_path / 'arm.yaml'
     file.write_text(ARM.read_text().replace(old, new))
-    assert_one_line_complaint(leg_fk('list', '-k', file), complaint)
-
-
-def test_a_file_that_is_not_there_is_one_line(tmp_path):
-    assert_one_line_complaint(leg_fk('list', '-k', tmp_path / 'none.yaml'), 'none.yaml')
-    assert_one_line_complaint(leg_fk('list', '-k', tmp_path), str(tmp_path))
+    assert_one_line_complaint(run_main('list', '-k', file), complaint)

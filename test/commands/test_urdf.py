@@ -1,21 +1,17 @@
 """`leg_fk urdf`, read by Pinocchio, which knows nothing of DH tables."""
 
 import math
-from pathlib import Path
 import re
 from xml.etree import ElementTree as ET
 
-from icub_leg_fk.kinematics import Catalog
-from icub_leg_fk.__main__ import main
-from icub_leg_fk.commands.urdf import xyz_rpy
-from support.leg_fk_process import assert_one_line_complaint, leg_fk
+from icub_leg_fk import Catalog, load_chain
+from icub_leg_fk.kinematics import config_file
+from icub_leg_fk.kinematics.rotation import roll_pitch_yaw
 import numpy as np
 import pytest
+from support.leg_fk_process import assert_one_line_complaint, run_main
 
-EXAMPLES = Path(__file__).parents[2] / 'config' / 'examples'
-ARM, UR5 = EXAMPLES / 'cylindrical_arm.yaml', EXAMPLES / 'ur5.yaml'
-
-ICUB = ['left_leg', 'right_leg', 'head_imu', '--chain-version', 'head_imu=v2', '--version']
+ICUB = ['left_leg', 'right_leg', 'head_imu=v2']
 TOLERANCE = 1e-9  # m, and each rotation entry
 
 SCARA = """
@@ -41,19 +37,37 @@ chains:
 """
 
 
+# Elbow and wrist move a second row each; the wrist counts backward.
+MIMIC = SCARA.replace('offset: -0.7, range', 'offset: -0.7, joint: elbow, range').replace(
+    'offset: 0.5, type: prismatic', 'offset: 0.5, type: prismatic, joint: lift').replace(
+    'offset: 0, range: [-3, 3]}', """offset: 0, range: [-3, 3], joint: wrist, gain: -1}
+          - {a: 0.1, d: 0.03, alpha: 0.6, offset: 0.1, joint: elbow, gain: -0.5}
+          - {a: 0.1, d: 0.03, alpha: 0.6, type: prismatic, joint: wrist, gain: 0.02}""")
+
+
+def urdf_of(*words):
+    done = run_main('urdf', *words)
+    assert (done.returncode, done.stderr) == (0, '')
+    return done.stdout
+
+
 @pytest.fixture
-def write_urdf(tmp_path):
-    def write(*words):
-        path = tmp_path / 'robot.urdf'
-        assert main(['urdf', *words, '-o', str(path)]) == 0
-        return path.read_text()
+def own_file(tmp_path):
+    """Return what writes a kinematics file, changed in places, and returns its path."""
+    def write(text, *changes):
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new)
+        file = tmp_path / 'robot.yaml'
+        file.write_text(text)
+        return file
     return write
 
 
 def largest_difference(urdf, chain, configurations=1000):
     """Compare Pinocchio's pose of the tip frame with ours, over random configurations."""
     pin = pytest.importorskip('pinocchio')
-    model = pin.buildModelFromXML(urdf)
+    model = pin.buildModelFromXML(urdf, mimic=True)
     data = model.createData()
     frame = model.getFrameId(chain.frame_id)
     assert frame < model.nframes, f'no frame {chain.frame_id}'
@@ -71,47 +85,54 @@ def largest_difference(urdf, chain, configurations=1000):
     return worst
 
 
+@pytest.mark.parametrize('foot_frame', ['dh', 'sole'])
 @pytest.mark.parametrize('version', ['v1', 'v2_5', 'v3'])
+def test_pinocchio_on_the_urdf_gives_our_foot_poses(version, foot_frame):
+    urdf = urdf_of('left_leg', 'right_leg', '--version', version)
+    for name in ('left_leg', 'right_leg'):
+        chain = load_chain(name, version, frame=foot_frame)
+        assert largest_difference(urdf, chain) < TOLERANCE
+
+
+def test_pinocchio_on_the_urdf_gives_our_head_poses():
+    assert largest_difference(urdf_of(*ICUB), load_chain('head_imu')) < TOLERANCE
+
+
+@pytest.mark.parametrize(('file', 'name'), [
+    ('cylindrical_arm.yaml', 'arm'), ('ur5.yaml', 'ur5'), ('panda.yaml', 'panda')])
+def test_pinocchio_gives_our_poses_of_other_robots(file, name):
+    path = config_file(f'examples/{file}')
+    assert largest_difference(urdf_of('-k', path), load_chain(name, file=path)) < TOLERANCE
+
+
 @pytest.mark.parametrize('foot_frame', ['dh', 'sole'])
-@pytest.mark.parametrize('name', ['left_leg', 'right_leg'])
-def test_pinocchio_on_the_urdf_gives_our_foot_poses(write_urdf, name, version, foot_frame):
-    chain = Catalog.load().chain(name, version, foot_frame)
-    assert largest_difference(write_urdf(*ICUB, version), chain) < TOLERANCE
+@pytest.mark.parametrize('text', [SCARA, MIMIC])
+def test_fixed_rows_tip_transform_slides_and_followers_are_in_the_urdf(own_file, text, foot_frame):
+    file = own_file(text)
+    chain = load_chain('scara', file=file, frame=foot_frame)
+    assert largest_difference(urdf_of('-k', file), chain) < TOLERANCE
 
 
-def test_pinocchio_on_the_urdf_gives_our_head_poses(write_urdf):
-    chain = Catalog.load().chain('head_imu', 'v2')
-    assert largest_difference(write_urdf(*ICUB, 'v2_5'), chain) < TOLERANCE
-
-
-@pytest.mark.parametrize(('file', 'name', 'version'), [
-    (ARM, 'arm', 'v1'), (UR5, 'ur5', 'series_3')])
-def test_pinocchio_gives_our_poses_of_other_robots(write_urdf, file, name, version):
-    chain = Catalog.load(file).chain(name, version)
-    urdf = write_urdf('-k', str(file), '--version', version)
-    assert largest_difference(urdf, chain) < TOLERANCE
-
-
-def test_a_rotation_that_was_typed_rounded_is_the_same_in_the_urdf(write_urdf, tmp_path):
-    file = tmp_path / 'scara.yaml'
+def test_a_rotation_that_was_typed_rounded_is_the_same_in_the_urdf(own_file):
     rounded = '[[0.8660254, -0.5, 0, 0], [0.5, 0.8660259, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]'
-    file.write_text(re.sub(r'T_Ro0: .*', f'T_Ro0: {rounded}', SCARA))
-    urdf = write_urdf('-k', str(file), '--version', 'v1')
-    assert rounded in file.read_text()
-    assert largest_difference(urdf, Catalog.load(file).chain('scara', 'v1')) < TOLERANCE
+    file = own_file(re.sub(r'T_Ro0: .*', f'T_Ro0: {rounded}', SCARA))
+    done = run_main('urdf', '-k', file)
+    assert 'corrected' in done.stderr
+    chain = Catalog.load(file).chain('scara')
+    assert largest_difference(done.stdout, chain) < TOLERANCE
 
 
-@pytest.mark.parametrize('foot_frame', ['dh', 'sole'])
-def test_virtual_link_tip_transform_and_slide_are_in_the_urdf(write_urdf, tmp_path, foot_frame):
-    file = tmp_path / 'scara.yaml'
-    file.write_text(SCARA)
-    chain = Catalog.load(file).chain('scara', 'v1', foot_frame)
-    urdf = write_urdf('-k', str(file), '--version', 'v1')
-    assert largest_difference(urdf, chain) < TOLERANCE
+def test_a_row_that_follows_is_a_mimic_joint_with_its_own_limits(own_file):
+    robot = ET.fromstring(urdf_of('-k', own_file(MIMIC)))
+    follower = robot.find("joint[@name='elbow_2']")
+    assert follower.find('mimic').attrib == {'joint': 'elbow', 'multiplier': '-0.5'}
+    limit = follower.find('limit')
+    assert (limit.get('lower'), limit.get('upper')) == ('-1.0', '1.0')
+    assert robot.find("joint[@name='wrist']/axis").get('xyz') == '0 0 -1'
 
 
-def test_limits_are_the_robots_ranges_and_the_erratum_stands_beside(write_urdf):
-    urdf = write_urdf('left_leg')
+def test_limits_are_the_robots_ranges_and_the_erratum_stands_beside():
+    urdf = urdf_of('left_leg')
     limit = ET.fromstring(urdf).find("joint[@name='l_hip_roll']/limit")
     lower, upper = (math.degrees(float(limit.get(key))) for key in ('lower', 'upper'))
     assert (lower, upper) == pytest.approx((-20, 120), abs=1e-12)
@@ -120,22 +141,19 @@ def test_limits_are_the_robots_ranges_and_the_erratum_stands_beside(write_urdf):
     assert '<!-- Erratum of the printed table: sign slip' in roll
 
 
-def test_frames_and_joints_are_named_as_in_the_robots_own_urdf(write_urdf):
-    robot = ET.fromstring(write_urdf(*ICUB, 'v2_5'))
+def test_frames_and_joints_are_named_as_in_the_robots_own_urdf():
+    robot = ET.fromstring(urdf_of(*ICUB))
     links = {link.get('name') for link in robot.findall('link')}
     assert {'root_link', 'l_foot_dh_frame', 'l_sole', 'r_foot_dh_frame', 'r_sole',
             'imu_frame'} <= links
     moving = {joint.get('name') for joint in robot.findall('joint')
               if joint.get('type') != 'fixed'}
-    catalog = Catalog.load()
-    assert moving == {name for chain in (catalog.chain('left_leg', 'v2_5'),
-                                         catalog.chain('right_leg', 'v2_5'),
-                                         catalog.chain('head_imu', 'v2'))
-                      for name in chain.joint_names}
+    chains = Catalog.load().select(ICUB)
+    assert moving == {name for chain in chains for name in chain.joint_names}
 
 
-def test_the_urdf_is_a_tree_with_the_root_frame_as_root(write_urdf):
-    robot = ET.fromstring(write_urdf(*ICUB, 'v2_5'))
+def test_the_urdf_is_a_tree_with_the_root_frame_as_root():
+    robot = ET.fromstring(urdf_of(*ICUB))
     links = [link.get('name') for link in robot.findall('link')]
     children = [joint.find('child').get('link') for joint in robot.findall('joint')]
     assert sorted(links) == sorted([*children, 'root_link'])
@@ -144,8 +162,8 @@ def test_the_urdf_is_a_tree_with_the_root_frame_as_root(write_urdf):
     assert used == materials
 
 
-def test_bones_reach_from_joint_to_joint(write_urdf):
-    robot = ET.fromstring(write_urdf('left_leg'))
+def test_bones_reach_from_joint_to_joint():
+    robot = ET.fromstring(urdf_of('left_leg'))
     lengths = [float(cylinder.get('length'))
                for cylinder in robot.findall("link[@name='l_knee_link']/visual/geometry/cylinder")]
     assert lengths == pytest.approx([0.2005])
@@ -158,7 +176,7 @@ def test_roll_pitch_yaw_are_accurate_at_and_near_gimbal_lock():
             for roll, yaw in rng.uniform(-math.pi, math.pi, (50, 2)):
                 T = np.eye(4)
                 T[:3, :3] = rotation(roll, pitch - nudge, yaw)
-                _, rpy = xyz_rpy(T)
+                rpy = roll_pitch_yaw(T[:3, :3])
                 assert np.abs(rotation(*rpy) - T[:3, :3]).max() < 4e-15
 
 
@@ -172,65 +190,62 @@ def rotation(roll, pitch, yaw):
     return Rz @ Ry @ Rx
 
 
-def test_without_chains_all_of_the_version_are_written(capsys):
-    assert main(['urdf']) == 0
-    robot = ET.fromstring(capsys.readouterr().out)
+def test_without_chains_all_of_the_version_are_written():
+    robot = ET.fromstring(urdf_of())
     assert robot.get('name') == 'icub'
     links = {link.get('name') for link in robot.findall('link')}
     assert {'l_sole', 'r_sole'} <= links and 'imu_frame' not in links
 
 
-def test_an_existing_file_is_replaced_whole_or_not_at_all(tmp_path):
+def test_the_file_written_is_whole_and_named_with_what_is_in_it(tmp_path):
     path = tmp_path / 'robot.urdf'
     path.write_text('old')
-    assert main(['urdf', 'no_such_chain', '-o', str(path)]) == 2
+    assert_one_line_complaint(run_main('urdf', 'no_such_chain', '-o', path), 'no_such_chain')
+    assert_one_line_complaint(run_main('urdf', 'left_leg', '-o', path), '--force')
     assert path.read_text() == 'old'
-    assert main(['urdf', 'left_leg', '-o', str(path), '--force']) == 0
-    assert path.read_text().startswith('<?xml')
+    done = run_main('urdf', 'left_leg', 'head_imu', '-o', path, '--force')
+    assert done.stdout == f'{path}: robot icub with left_leg=v2_5, head_imu=v2\n'
+    assert path.read_text() == urdf_of('left_leg', 'head_imu')
     assert [entry.name for entry in tmp_path.iterdir()] == ['robot.urdf']
+    assert run_main('urdf', 'left_leg', '-o', '-').stdout == urdf_of('left_leg')
 
 
-def broken(tmp_path, old, new):
-    file = tmp_path / 'robot.yaml'
-    text = SCARA.replace(old, new)
-    assert text != SCARA
-    file.write_text(text)
-    return ['-k', str(file), '--version', 'v1']
-
-
-@pytest.mark.parametrize(('words', 'complaint'), [
-    (['elbow'], "unknown chain 'elbow'"),
-    (['left_leg', '--version', 'v9'], "'v9'; did you mean 'v1'? known: v1, v2_5, v3"),
-    (['head_imu'], 'known: v2'),
-    (['--version', 'v9'], "unknown version 'v9'"),
-    (['--chain-version', 'head_imu'], 'CHAIN=VERSION'),
-    (['--chain-version', 'tail=v2'], 'found tail, allowed: left_leg, right_leg, head_imu'),
-    (['left_leg', '--chain-version', 'head_imu=v2'], 'found head_imu, allowed: left_leg'),
-    (['-k', 'no_such_file.yaml'], 'no_such_file.yaml'),
-    (['--name', 'a\x01b'], "--name: found 'a\\x01b', allowed: printable text"),
-    (['-o', '-1.urdf'], 'unknown option -1.urdf'),
-    (['left_leg', '-o', '/dev/null'], '/dev/null'),
-    (['left_leg', '-o', '/no/such/folder/x.urdf'], 'there is no directory'),
+@pytest.mark.parametrize(('text', 'old', 'new', 'complaint'), [
+    (SCARA, ', range: [0, 1]', '', 'joint lift of chain scara has no range'),
+    (SCARA, 'frame: pad', 'frame: lift_link', 'link lift_link is there 2 times'),
+    (MIMIC, 'gain: -1', 'gain: -3', 'joint wrist of chain scara moves its first row by -3 times'),
+    (MIMIC, 'range: [-3, 3], ', '', 'joint wrist_2 of chain scara has no range'),
 ])
-def test_a_mistake_is_one_line_and_exit_2(words, complaint):
-    assert_one_line_complaint(leg_fk('urdf', *words), complaint)
+def test_what_a_urdf_cannot_say_is_refused(own_file, text, old, new, complaint):
+    file = own_file(text, (old, new))
+    assert_one_line_complaint(run_main('urdf', '-k', file), complaint)
 
 
-def test_a_slide_without_range_is_refused(tmp_path, capsys):
-    assert main(['urdf', *broken(tmp_path, ', range: [0, 1]', '')]) == 2
-    assert 'joint lift: found no range' in capsys.readouterr().err
-
-
-def test_a_name_that_stands_twice_is_refused(tmp_path, capsys):
-    assert main(['urdf', *broken(tmp_path, 'frame: pad', 'frame: lift_link')]) == 2
-    assert 'found link lift_link twice' in capsys.readouterr().err
-
-
-def test_chains_of_different_roots_are_refused(tmp_path, capsys):
+def other_chain(*changes):
+    """Return SCARA with a second chain of the same joints, changed in places."""
     chain = SCARA[SCARA.index('  scara:'):]
-    other = chain.replace('scara:', 'other:').replace('tip: gripper', 'tip: other').replace(
-        'root_frame: base', 'root_frame: table')
-    file = tmp_path / 'robots.yaml'
-    file.write_text(SCARA + other)
-    assert main(['urdf', '-k', str(file), '--version', 'v1']) == 2
-    assert 'one root: found base, table' in capsys.readouterr().err
+    names = (('scara:', 'other:'), ('tip: gripper', 'tip: hand'), ('gripper}', 'hand}'),
+             ('frame: pad', 'frame: palm'))
+    for old, new in (*names, *changes):
+        assert old in chain
+        chain = chain.replace(old, new)
+    return SCARA + chain
+
+
+def test_a_joint_that_two_chains_share_is_there_once(own_file):
+    # The lift is elsewhere along its axis in the other table, which makes no difference.
+    file = own_file(other_chain(('d: 0, alpha: 3.14', 'd: 0.02, alpha: 3.14'),
+                                ('d: 0.05, alpha: 1.57', 'd: 0.07, alpha: 1.57')))
+    urdf = urdf_of('-k', file)
+    assert urdf.count('<joint name="lift"') == 1
+    for name in ('scara', 'other'):
+        assert largest_difference(urdf, load_chain(name, file=file)) < TOLERANCE
+
+
+@pytest.mark.parametrize(('change', 'complaint'), [
+    (('root_frame: base', 'root_frame: table'), 'the roots base, table'),
+    (('a: 0.3, d: 0.4', 'a: 0.3001, d: 0.4'), "joint 'elbow' of chain other is elsewhere"),
+])
+def test_chains_that_do_not_fit_each_other_are_refused(own_file, change, complaint):
+    file = own_file(other_chain(change))
+    assert_one_line_complaint(run_main('urdf', '-k', file), complaint)

@@ -7,8 +7,8 @@ import subprocess
 import sys
 from typing import Any
 
-from icub_leg_fk.errors import CatalogError, UnknownNameError
-from icub_leg_fk.kinematics import Catalog, catalog, config_file
+from icub_leg_fk.errors import CatalogError, LegFKError, UnknownNameError
+from icub_leg_fk.kinematics import Catalog, catalog, config_file, load_chain
 import numpy as np
 import pytest
 import yaml
@@ -114,10 +114,10 @@ def test_errata_stand_beside_the_printed_ranges_of_the_documented_legs() -> None
         assert 'sign' in errata[1] and 'narrower' in errata[4]
 
 
-def test_version_3_says_that_it_is_not_documented() -> None:
-    sources = {(name, version): table.source for name, entry in CATALOG.chains.items()
-               for version, table in entry.versions.items()}
-    assert all(('iKin' in source) == (version == 'v3') for (_, version), source in sources.items())
+def test_version_3_names_its_source_which_is_not_the_documents() -> None:
+    for entry in CATALOG.chains.values():
+        for version, chain in entry.versions.items():
+            assert ('iKin' in chain.source) == (version == 'v3')
 
 
 @pytest.mark.parametrize(('arguments', 'message'), [
@@ -136,12 +136,43 @@ def test_an_unknown_name_lists_the_known_ones(arguments: tuple[str, ...], messag
     assert str(error.value) == message
 
 
+def test_a_version_that_one_chain_lacks_is_answered_with_the_way_to_name_it() -> None:
+    with pytest.raises(UnknownNameError, match=r"chain head_imu 'v1'; .*known: v2; .*head_imu=v2"):
+        CATALOG.select(['left_leg', 'head_imu'], 'v1')
+    chosen = CATALOG.select(['left_leg', 'head_imu=v2'], 'v1')
+    assert [(chain.name, chain.version) for chain in chosen] == [
+        ('left_leg', 'v1'), ('head_imu', 'v2')]
+
+
+def test_the_files_default_versions_count_where_none_is_given() -> None:
+    versions = {name: CATALOG.chain(name).version for name in CATALOG.chains}
+    assert versions == {'left_leg': 'v2_5', 'right_leg': 'v2_5', 'head_imu': 'v2'}
+    assert load_chain('left_leg').version == 'v2_5'
+    assert load_chain('left_leg=v1').version == load_chain('left_leg', 'v1').version == 'v1'
+    assert [chain.version for chain in CATALOG.select(CATALOG.chains)] == ['v2_5', 'v2_5', 'v2']
+
+
+@pytest.mark.parametrize(('names', 'words'), [
+    (['left_leg', 'left_leg=v1'], 'chain left_leg is named twice'),
+    ([], 'no chain is named; allowed: one or more of left_leg, right_leg, head_imu'),
+    (['left_leg=v3', 'right_leg'], 'left_leg=v3 and right_leg=v2_5 do not go together: x, y, z of '
+                                   'root_link point forward, left, up in the one and backward, '
+                                   'right, up in the other'),
+    (['left_leg=v9'], "unknown version of chain left_leg 'v9'; known: v1, v2_5, v3"),
+    (['left_leg='], "unknown chain 'left_leg='; did you mean 'left_leg'?"),
+])
+def test_chains_that_cannot_be_used_together_are_refused(names: list[str], words: str) -> None:
+    with pytest.raises(LegFKError) as error:
+        CATALOG.select(names)
+    assert words in str(error.value)
+
+
 def test_frames_are_named_as_in_the_robots_urdfs() -> None:
     for name, side in (('left_leg', 'l'), ('right_leg', 'r')):
         dh, sole = CATALOG.chain(name, 'v2_5'), CATALOG.chain(name, 'v2_5', 'sole')
-        assert (dh.root_frame, dh.tip_frame) == ('root_link', f'{side}_foot_dh_frame')
-        assert (sole.root_frame, sole.tip_frame) == ('root_link', f'{side}_sole')
-    assert CATALOG.chain('head_imu', 'v2').tip_frame == 'imu_frame'
+        assert (dh.root_frame, dh.frame_id) == ('root_link', f'{side}_foot_dh_frame')
+        assert (sole.root_frame, sole.frame_id) == ('root_link', f'{side}_sole')
+    assert CATALOG.chain('head_imu', 'v2').frame_id == 'imu_frame'
 
 
 OWN = """

@@ -1,14 +1,16 @@
 """Conventions of DH tables: roboticstoolbox's own models, the maker's Panda, what is mended."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from icub_leg_fk.errors import CatalogError
-from icub_leg_fk.kinematics import Catalog, load_chain
-from icub_leg_fk.kinematics.chain import modified_rows
-from icub_leg_fk.__main__ import main
+from icub_leg_fk.kinematics import Catalog, DHLink, load_chain
+from icub_leg_fk.kinematics.link import modified_rows, standard_rows
 import numpy as np
 import pytest
+from support.any_chain import chain_of
+from support.oracle import rotation_x, rotation_z, translation
 
 EXAMPLES = Path(__file__).resolve().parents[2] / 'config' / 'examples'
 TOLERANCE = 1e-12
@@ -33,28 +35,32 @@ def models() -> dict[str, Any]:
     return found
 
 
+def row_as_yaml(link: Any) -> str:
+    # Its standard links slide along z by q; theta and d are what the joint does not move.
+    offset, d, more = float(link.offset), float(link.d), ''
+    if link.isprismatic:
+        offset, d, more = float(link.theta), d + offset, ', type: prismatic'
+    if link.isflip:
+        more += ', gain: -1'
+    a, alpha = float(link.a), float(link.alpha)
+    return f'a: {a!r}, d: {d!r}, alpha: {alpha!r}, offset: {offset!r}{more}'
+
+
+def matrix(T: Any) -> str:
+    return str(np.asarray(T, dtype=float).tolist())
+
+
 def as_yaml(model: Any) -> str:
     """Return a model of roboticstoolbox as a kinematics file, every digit of it."""
-    def matrix(T: Any) -> str:
-        return str(np.asarray(T, dtype=float).tolist())
-
-    rows = []
-    for link in model.links:
-        # Its standard links slide along z by q; theta and d are what the joint does not move.
-        slides = bool(link.isprismatic)
-        offset = float(link.theta) if slides else float(link.offset)
-        d = float(link.d) + float(link.offset) if slides else float(link.d)
-        rows.append(f'{{a: {float(link.a)!r}, d: {d!r}, alpha: {float(link.alpha)!r}, '
-                    f'offset: {offset!r}{", type: prismatic" * slides}'
-                    f'{", sign: -1" * bool(link.isflip)}}}')
-    lines = ''.join(f'          - {row}\n' for row in rows)
+    lines = ''.join(f'          - {{{row_as_yaml(link)}}}\n' for link in model.links)
+    names = ', '.join(f'q{i}' for i in range(len(model.links)))
     return f"""
 units: {{length: m, angle: rad}}
 chains:
   robot:
     tip: tip
     root_frame: base
-    joints: [{', '.join(f'q{i}' for i in range(len(rows)))}]
+    joints: [{names}]
     tip_frames: {{tool: {{frame: tool}}}}
     versions:
       v1:
@@ -65,22 +71,27 @@ chains:
 """
 
 
+def largest_length(model: Any) -> float:
+    return max(1.0, *(abs(float(link.a)) + abs(float(link.d)) for link in model.links))
+
+
 def test_the_models_of_roboticstoolbox_are_computed_exactly(tmp_path: Path) -> None:
     found = models()
-    modified = {name for name, model in found.items() if model.mdh}
-    slides = {name for name, model in found.items()
-              if any(link.isprismatic for link in model.links)}
-    assert len(found) >= 20 and modified and slides
+    modified = [name for name, model in found.items() if model.mdh]
+    sliding = [name for name, model in found.items() if any(model.prismaticjoints)]
+    assert len(found) >= 20 and modified and sliding
     rng = np.random.default_rng(20)
     for name, model in found.items():
         file = tmp_path / f'{name}.yaml'
         file.write_text(as_yaml(model))
-        chain = Catalog.load(file).chain('robot', 'v1')
-        scale = max(1.0, max(abs(float(link.a)) + abs(float(link.d)) for link in model.links))
-        for q in rng.uniform(-3, 3, (20, chain.n)):
+        chain = Catalog.load(file).chain('robot')
+        allowed = TOLERANCE * largest_length(model)
+        for q in rng.uniform(-3, 3, (6, chain.n)):
+            frames = np.array([T.A for T in model.fkine_all(q)])
             expected = model.fkine(q).A
-            assert np.abs(chain.forward(q) - expected).max() < TOLERANCE * scale, name
-            assert np.abs(np.array(chain.pose(q)[:3]) - expected[:3, 3]).max() < TOLERANCE * scale
+            assert np.abs(chain.frames(q)[:-1] - frames).max() < allowed, name
+            assert np.abs(chain.forward(q) - expected).max() < allowed, name
+            assert np.abs(np.array(chain.pose(q)[:3]) - expected[:3, 3]).max() < allowed, name
 
 
 def test_the_makers_panda_is_roboticstoolboxs() -> None:
@@ -92,14 +103,41 @@ def test_the_makers_panda_is_roboticstoolboxs() -> None:
         assert np.abs(panda.forward(q) - flange).max() < TOLERANCE
 
 
-def test_modified_rows_are_those_of_the_file_and_print_as_such() -> None:
+def test_a_modified_chain_gives_its_rows_and_frames_as_craig_does() -> None:
     panda = load_chain('panda', 'fci', file=EXAMPLES / 'panda.yaml')
-    rows = modified_rows(panda)
+    rows = [row.link for row in panda.rows()]
     assert [row.a for row in rows] == [0, 0, 0, 0.0825, -0.0825, 0, 0.088, 0]
     assert np.degrees([row.alpha for row in rows]) == pytest.approx(
         [0, -90, 90, 90, -90, 90, 90, 0])
     assert 'modified' in str(panda).splitlines()[0]
     assert str(panda).splitlines()[5].split()[:4] == ['3', 'panda_joint4', '82.5', '0']
+    # Craig's frame i turns with joint i, about its own z axis.
+    still, moved = panda.frames([0.0] * 7), panda.frames([0.0, 0.0, 0.0, 0.7, 0.0, 0.0, 0.0])
+    assert np.array_equal(still[:4], moved[:4])
+    assert np.array_equal(still[4, :3, 2:], moved[4, :3, 2:])
+    assert np.abs(still[5:, :3, 3] - moved[5:, :3, 3]).max() > 0.05
+
+
+FIXED, PLAIN = DHLink(0, 0, 0, joint_type='fixed'), DHLink(0, 0.2, 0, 0.3)
+TURN, SHIFTED = DHLink(0.1, 0, 0.7, -0.2), DHLink(0.3, 0, -0.4, joint_type='fixed')
+
+
+@pytest.mark.parametrize('rows', [
+    (PLAIN,), (TURN,), (FIXED, TURN), (SHIFTED, PLAIN), (FIXED, FIXED, PLAIN), (TURN, SHIFTED),
+    (SHIFTED, TURN, PLAIN), (PLAIN, FIXED)])
+def test_modified_rows_come_back_from_standard_ones(rows: tuple[DHLink, ...]) -> None:
+    assert modified_rows(standard_rows(rows)) == rows
+    chain = replace(chain_of(standard_rows(rows)), convention='modified')
+    q = [0.4] * chain.n
+    T = np.eye(4)
+    for row in rows:
+        moved = 0.0 if row.is_fixed else 0.4
+        T = T @ rotation_x(row.alpha) @ translation(row.a, 0, 0)
+        T = T @ rotation_z(row.offset + moved) @ translation(0, 0, row.d)
+    assert chain.forward(q) == pytest.approx(T, abs=1e-15)
+    assert chain.frames(q).shape == (len(rows) + 2, 4, 4)
+    assert chain.frames(q)[-1] == pytest.approx(T, abs=1e-15)
+    assert chain.pose(q)[:3] == pytest.approx(T[:3, 3], abs=1e-15)
 
 
 ARM = """
@@ -115,8 +153,8 @@ chains:
       v1:
         T_Ro0: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
         links:
-          - {a: 0.5, d: 0, alpha: pi/2, offset: -pi/2, sign: -1}
-          - {a: 0, d: 0.2, alpha: pi, offset: 3*pi/4, type: prismatic, sign: -1}
+          - {a: 0.5, d: 0, alpha: pi/2, offset: -pi/2, gain: -1}
+          - {a: 0, d: 0.2, alpha: pi, offset: 3*pi/4, type: prismatic, gain: -1}
       v2:
         root_frame: other_base
         joints: [swing, push]
@@ -135,7 +173,7 @@ def arm(tmp_path: Path) -> Path:
     return file
 
 
-def test_fractions_of_pi_are_exact_and_a_sign_turns_a_joint_around(arm: Path) -> None:
+def test_fractions_of_pi_are_exact_and_a_gain_turns_a_joint_around(arm: Path) -> None:
     chain = Catalog.load(arm).chain('arm', 'v1')
     assert [link.alpha for link in chain.links] == [np.pi / 2, np.pi]
     assert [link.offset for link in chain.links] == [-np.pi / 2, 3 * np.pi / 4]
@@ -147,24 +185,35 @@ def test_fractions_of_pi_are_exact_and_a_sign_turns_a_joint_around(arm: Path) ->
 
 def test_a_version_says_otherwise_what_its_chain_says(arm: Path) -> None:
     one, two = (Catalog.load(arm).chain('arm', version) for version in ('v1', 'v2'))
-    assert (one.root_frame, one.joint_names, one.tip_frame) == ('base', ('turn', 'slide'), 'tool')
-    assert (two.root_frame, two.joint_names, two.tip_frame) == (
+    assert (one.root_frame, one.joint_names, one.frame_id) == ('base', ('turn', 'slide'), 'tool')
+    assert (two.root_frame, two.joint_names, two.frame_id) == (
         'other_base', ('swing', 'push'), 'claw')
     assert one.tip == two.tip == 'hand'
 
 
-def test_what_can_hardly_be_meant_is_computed_and_said(arm: Path,
-                                                       capsys: pytest.CaptureFixture) -> None:
+def test_what_can_hardly_be_meant_is_computed_and_reported(arm: Path) -> None:
     rotation, length, angle = Catalog.load(arm).warnings
     assert f'{arm}:8: chain arm, field tip_frames, pad, field transform: the rot' in rotation
     assert f'{arm}:23: chain arm, version v2, row 1, field a: 250 m is unlikely' in length
     assert f'{arm}:23: chain arm, version v2, row 1, field alpha: 90 rad is unlike' in angle
     R = Catalog.load(arm).chain('arm', 'v1', 'pad').forward([0, 0])[:3, :3]
     assert np.abs(R @ R.T - np.eye(3)).max() < 1e-15
-    with pytest.warns(UserWarning, match='the rotation is rounded'):
+    with pytest.warns(UserWarning) as warned:
         load_chain('arm', 'v1', file=arm)
-    assert main(['pose', 'arm', '-k', str(arm), '--version', 'v1', '--radians', '0', '0']) == 0
-    assert capsys.readouterr().err.count('leg_fk: warning: ') == 3
+    assert [str(warning.message) for warning in warned] == [rotation, length, angle]
+    assert {warning.filename for warning in warned} == {__file__}
+
+
+def test_radians_in_a_file_of_degrees_are_computed_and_reported(tmp_path: Path) -> None:
+    file = tmp_path / 'arm.yaml'
+    own = ARM.replace('angle: rad', 'angle: deg').replace('0.7071', '0.70710678118')
+    own = own.replace('alpha: pi/2, offset: -pi/2', 'alpha: 1.5708, offset: -3.142').replace(
+        'alpha: pi, offset: 3*pi/4', 'alpha: 45.5, offset: -0.78').replace('250', '0.25')
+    file.write_text(own)
+    alpha, offset = Catalog.load(file).warnings
+    assert 'version v1, row 0, field alpha: 1.5708 deg is unlikely, since it is a fracti' in alpha
+    assert 'version v1, row 0, field offset: -3.142 deg is unlikely' in offset
+    assert Catalog.load(file).chain('arm', 'v1').links[0].alpha == np.radians(1.5708)
 
 
 def test_three_decimals_are_too_few_for_a_rotation(arm: Path) -> None:

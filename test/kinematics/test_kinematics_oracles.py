@@ -1,11 +1,11 @@
-"""Every documented chain, in every version and tip frame, against Pinocchio, PyKDL and by hand."""
+"""Every documented chain, in every version and tip frame, against Pinocchio and by hand."""
 
 from typing import Any
 
 from icub_leg_fk.kinematics import Catalog
 import numpy as np
-from support.oracle import CASES, HandMadeArm, KDLArm, PinocchioArm, quaternion_to_matrix, TABLES
 import pytest
+from support.oracle import CASES, HandMadeArm, PinocchioArm, quaternion_to_matrix, TABLES
 
 CONFIGURATIONS = 1000
 TOLERANCE = 1e-12
@@ -13,7 +13,6 @@ TOLERANCE = 1e-12
 CATALOG = Catalog.load()
 ORACLES = [
     pytest.param(('pinocchio', PinocchioArm), id='pinocchio'),
-    pytest.param(('PyKDL', KDLArm), id='kdl'),
     pytest.param(('numpy', HandMadeArm), id='by-hand'),
 ]
 

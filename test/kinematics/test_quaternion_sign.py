@@ -10,7 +10,7 @@ from support.recorded_walk import needs_recorded_walk, read_recorded_walk, read_
 CATALOG = Catalog.load()
 CHAINS = [CATALOG.chain(name, version, frame) for name, entry in CATALOG.chains.items()
           for version, table in entry.versions.items() for frame in table.tip_frames]
-every_chain = pytest.mark.parametrize('chain', CHAINS, ids=lambda c: f'{c.tip_frame} {c.version}')
+every_chain = pytest.mark.parametrize('chain', CHAINS, ids=lambda c: f'{c.frame_id} {c.version}')
 
 
 def flips(chain: Chain, Q: np.ndarray) -> int:
@@ -51,7 +51,7 @@ def test_no_flip_on_any_path_within_half_a_turn_of_zero(chain: Chain, data: st.D
     """Straight paths between postures inside the ranges, cut where half a turn is reached."""
     inside = [st.floats(max(lower, -np.pi), min(upper, np.pi)) for lower, upper in zip(
         chain.lower.tolist(), chain.upper.tolist(), strict=True)]
-    start, end = (np.array([data.draw(values) for values in inside]) for _ in range(2))
+    start, end = np.array(data.draw(st.tuples(st.tuples(*inside), st.tuples(*inside))))
     path = start + np.linspace(0, 1, 200)[:, None] * (end - start)
     zero = chain.forward(np.zeros(chain.n))[:3, :3]
     traces = np.einsum('ij,nij->n', zero, chain.forward(path)[:, :3, :3])

@@ -5,8 +5,8 @@ import subprocess
 import sys
 
 import numpy as np
-from support.oracle import quaternion_to_matrix
 import pytest
+from support.oracle import quaternion_to_matrix
 
 ROOT = Path(__file__).parents[2]
 

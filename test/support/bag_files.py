@@ -1,13 +1,15 @@
 """Bags for tests, written and read with rosbags (which shares no code with `leg_fk bag`)."""
 
-import csv
 from pathlib import Path
 
-from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.kinematics import load_chain
 import numpy as np
 import pytest
+from support.recorded_walk import FILE, read_recorded_walk
 
-interfaces = pytest.importorskip('rosbags.interfaces', reason='bags are made with rosbags')
+interfaces = pytest.importorskip(
+    'rosbags.interfaces', reason='bags are made with rosbags'
+)
 rosbag2 = pytest.importorskip('rosbags.rosbag2')
 highlevel = pytest.importorskip('rosbags.highlevel')
 typesys = pytest.importorskip('rosbags.typesys')
@@ -18,26 +20,38 @@ TYPES = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 STRING = 'std_msgs/msg/String'
 POSE = 'geometry_msgs/msg/PoseStamped'
+TWIST = 'geometry_msgs/msg/TwistStamped'
+TF = 'tf2_msgs/msg/TFMessage'
 LEFT_POSE = '/foot_pose_publisher/left_foot/pose'
 RIGHT_POSE = '/foot_pose_publisher/right_foot/pose'
-STORAGES = {'mcap': rosbag2.StoragePlugin.MCAP, 'sqlite3': rosbag2.StoragePlugin.SQLITE3}
+LEFT_TWIST = '/foot_pose_publisher/left_foot/twist'
+RIGHT_TWIST = '/foot_pose_publisher/right_foot/twist'
+STORAGES = {
+    'mcap': rosbag2.StoragePlugin.MCAP,
+    'sqlite3': rosbag2.StoragePlugin.SQLITE3,
+}
 ENDINGS = {'mcap': '.mcap', 'sqlite3': '.db3'}
-LEGS = tuple(f'{side}_{joint}' for side in 'lr' for joint in (
-    'hip_pitch', 'hip_roll', 'hip_yaw', 'knee', 'ankle_pitch', 'ankle_roll'))
+LEGS = load_chain('left_leg').joint_names + load_chain('right_leg').joint_names
 OTHERS = tuple(f'arm_joint_{i}' for i in range(20))
-WALK = Path(__file__).resolve().parents[3] / 'shared' / 'data' / 'icub_genova04_walking.csv'
+FOREVER = interfaces.QosTime(2147483647, 4294967295)
 
 
-def qos(depth, reliability, durability, lease):
+def qos(depth, reliability, durability, lease=FOREVER):
     """Return a QoS profile with names and numbers of every kind."""
-    long = interfaces.QosTime(2147483647, 4294967295)
     return interfaces.Qos(
-        interfaces.QosHistory.KEEP_LAST, depth, interfaces.QosReliability[reliability],
-        interfaces.QosDurability[durability], long, long, interfaces.QosLiveliness.AUTOMATIC,
-        lease, depth == 1)
+        interfaces.QosHistory.KEEP_LAST,
+        depth,
+        interfaces.QosReliability[reliability],
+        interfaces.QosDurability[durability],
+        FOREVER,
+        FOREVER,
+        interfaces.QosLiveliness.AUTOMATIC,
+        lease,
+        depth == 1,
+    )
 
 
-SENSOR_QOS = qos(5, 'BEST_EFFORT', 'VOLATILE', interfaces.QosTime(2147483647, 4294967295))
+SENSOR_QOS = qos(5, 'BEST_EFFORT', 'VOLATILE')
 LATCHED_QOS = qos(1, 'RELIABLE', 'TRANSIENT_LOCAL', interfaces.QosTime(1, 500))
 
 
@@ -46,10 +60,15 @@ def joint_state(stamp, names=LEGS, positions=None, velocities=(), frame_id=''):
     if positions is None:
         positions = [0.01 * (i + 1) for i in range(len(names))]
     types = TYPES.types
-    sec, nanosec = divmod(stamp or 0, SECOND)
+    time = types['builtin_interfaces/msg/Time'](*divmod(stamp or 0, SECOND))
+    header = types['std_msgs/msg/Header'](time, frame_id)
     message = types[JOINT_STATE](
-        types['std_msgs/msg/Header'](types['builtin_interfaces/msg/Time'](sec, nanosec), frame_id),
-        list(names), np.array(positions, float), np.array(velocities, float), np.zeros(0))
+        header,
+        list(names),
+        np.array(positions, float),
+        np.array(velocities, float),
+        np.zeros(0),
+    )
     return bytes(TYPES.serialize_cdr(message, JOINT_STATE))
 
 
@@ -62,73 +81,91 @@ def walk(count, rate=100.0, names=OTHERS[:10] + LEGS + OTHERS[10:]):
     """Return (time, data) of joint states of swinging legs."""
     rows = []
     for i in range(count):
-        time = START + round(i * SECOND / rate)
-        q = 0.3 * np.sin(np.arange(len(names)) + 3 * i / rate)
-        v = 0.9 * np.cos(np.arange(len(names)) + 3 * i / rate)
-        rows.append((time + 40_000, joint_state(time, names, q, v)))
+        stamp = START + round(i * SECOND / rate)
+        phase = np.arange(len(names)) + 3 * i / rate
+        data = joint_state(stamp, names, 0.3 * np.sin(phase), 0.9 * np.cos(phase))
+        rows.append((stamp + 40_000, data))
     return rows
 
 
 def recorded_walk():
     """Return (time, data) of the walk of a real robot."""
-    if not WALK.exists():
-        pytest.skip(f'the recorded walk is not here: {WALK}')
-    with WALK.open() as file:
-        rows = list(csv.DictReader(line for line in file if not line.startswith('#')))
-    names = [name for name in LEGS if name in rows[0]]
-    assert len(names) == 12
-    messages = []
-    for row in rows:
-        stamp = START + round(float(row['time']) * SECOND)
-        messages.append((stamp + 250_000,
-                         joint_state(stamp, names, [float(row[name]) for name in names])))
-    return messages
+    if not FILE.is_file():
+        pytest.skip(f'the recorded walk is not there: {FILE}')
+    names, times, positions, _ = read_recorded_walk()
+    stamps = [START + round(time * SECOND) for time in times.tolist()]
+    return [
+        (stamp + 250_000, joint_state(stamp, names, q))
+        for stamp, q in zip(stamps, positions, strict=True)
+    ]
 
 
-def write_bag(path, storage='mcap', joints=None, compression=None, others=True,
-              topic='/joint_states'):
+def write_bag(
+    path,
+    storage='mcap',
+    joints=None,
+    compression=None,
+    others=True,
+    topic='/joint_states',
+):
     """Write a bag of joint states and, unless told, of two other topics, one of them silent."""
     joints = walk(200) if joints is None else joints
+    topics = {topic: (JOINT_STATE, [SENSOR_QOS], joints)}
+    if others:
+        texts = [
+            (time + 1000, string(f'message {3 * i}'))
+            for i, (time, _) in enumerate(joints[::3])
+        ]
+        topics['/text'] = (STRING, [LATCHED_QOS, SENSOR_QOS], texts)
+        topics['/silent'] = ('nav_msgs/msg/Odometry', [], [])
+    return write_topics(path, topics, storage, compression)
+
+
+def write_topics(path, topics, storage='mcap', compression=None):
+    """Write a bag of topics, each with its type, QoS and messages (time, data)."""
     writer = rosbag2.Writer(path, version=9, storage_plugin=STORAGES[storage])
     if compression:
-        writer.set_compression(rosbag2.CompressionMode[compression.upper()],
-                               rosbag2.CompressionFormat.ZSTD)
+        writer.set_compression(
+            rosbag2.CompressionMode[compression.upper()], rosbag2.CompressionFormat.ZSTD
+        )
     with writer:
-        states = writer.add_connection(topic, JOINT_STATE, typestore=TYPES,
-                                       offered_qos_profiles=[SENSOR_QOS])
-        if others:
-            text = writer.add_connection('/text', STRING, typestore=TYPES,
-                                         offered_qos_profiles=[LATCHED_QOS, SENSOR_QOS])
-            writer.add_connection('/silent', 'nav_msgs/msg/Odometry', typestore=TYPES)
-        for i, (time, data) in enumerate(joints):
-            writer.write(states, time, data)
-            if others and i % 3 == 0:
-                writer.write(text, time + 1000, string(f'message {i}'))
+        rows = []
+        for name, (message_type, profiles, messages) in topics.items():
+            connection = writer.add_connection(
+                name, message_type, typestore=TYPES, offered_qos_profiles=profiles
+            )
+            rows += [(connection, time, data) for time, data in messages]
+        for row in sorted(rows, key=lambda row: row[1]):
+            writer.write(*row)
     return path
 
 
 def read_bag(path):
     """Return the topics of a bag and its messages as (topic, time, data)."""
     with highlevel.AnyReader([Path(path)], default_typestore=TYPES) as reader:
-        topics = {
-            connection.topic: (connection.msgtype, connection.ext.serialization_format,
-                               tuple(connection.ext.offered_qos_profiles))
-            for connection in reader.connections}
-        messages = [(connection.topic, time, bytes(data))
-                    for connection, time, data in reader.messages()]
+        topics = {}
+        for each in reader.connections:
+            profiles = tuple(each.ext.offered_qos_profiles)
+            topics[each.topic] = (each.msgtype, each.ext.serialization_format, profiles)
+        messages = [
+            (each.topic, time, bytes(data)) for each, time, data in reader.messages()
+        ]
         assert len(messages) == reader.message_count
     return topics, messages
 
 
-def poses_of(messages, topic):
-    """Return (time, message) of the poses on a topic."""
-    return [(time, TYPES.deserialize_cdr(data, POSE))
-            for name, time, data in messages if name == topic]
+def poses_of(messages, topic, message_type=POSE):
+    """Return (time, message) of a topic, which may be of another type, too."""
+    return [
+        (time, TYPES.deserialize_cdr(data, message_type))
+        for name, time, data in messages
+        if name == topic
+    ]
 
 
 def expected_poses(joints, leg='left_leg', version='v2_5', foot_frame='dh'):
     """Return (stamp, (4, 4) matrix) of whole messages, by the plain product of matrices."""
-    chain = Catalog.load().chain(leg, version, foot_frame)
+    chain = load_chain(leg, version, frame=foot_frame)
     found = []
     for _, data in joints:
         message = TYPES.deserialize_cdr(data, JOINT_STATE)

@@ -1,8 +1,12 @@
-"""Running the `leg_fk` command as a user does: in a process of its own."""
+"""Running the `leg_fk` command: in a process of its own, as a user does, or in this one."""
 
+from contextlib import redirect_stderr, redirect_stdout
+import io
 import os
 import subprocess
 import sys
+
+from icub_leg_fk.__main__ import main
 
 COMMAND = [sys.executable, '-m', 'icub_leg_fk']
 
@@ -11,6 +15,14 @@ def leg_fk(*words, environment=None):
     """Run `leg_fk` to its end; return the finished process with its output as text."""
     return subprocess.run([*COMMAND, *map(str, words)], capture_output=True, text=True, timeout=60,
                           env={**os.environ, **(environment or {})})
+
+
+def run_main(*words):
+    """Run `leg_fk` in this process; return what it would leave as a process of its own."""
+    out, err = io.StringIO(), io.StringIO()
+    with redirect_stdout(out), redirect_stderr(err):
+        status = main([str(word) for word in words])
+    return subprocess.CompletedProcess(words, status, out.getvalue(), err.getvalue())
 
 
 def assert_one_line_complaint(done, complaint):

@@ -1,4 +1,4 @@
-"""Answers this project did not compute: the printed tables in Pinocchio, in PyKDL, and by hand.
+"""Answers this project did not compute: the printed tables in Pinocchio and by hand.
 
 The numbers are typed in from the documents, and each model is put together from rotations and
 translations about the axes; nothing here is shared with the code under test.
@@ -101,35 +101,6 @@ class PinocchioArm:
             self.model, self.data, q, self.tip, self.pin.ReferenceFrame.LOCAL_WORLD_ALIGNED))
 
 
-class KDLArm:
-    """A printed table as a PyKDL chain of its own Denavit-Hartenberg frames."""
-
-    def __init__(self, name: str, version: str, frame: str) -> None:
-        import PyKDL as kdl
-
-        T_root_0, rows, T_n_tip = TABLES[name, version]
-        self.kdl, self.chain = kdl, kdl.Chain()
-        fixed = kdl.Joint(getattr(kdl.Joint, 'Fixed', None) or getattr(kdl.Joint, 'None'))
-        self.chain.addSegment(kdl.Segment(fixed, self._frame(T_root_0)))
-        for a, d, alpha, offset in rows:
-            link = kdl.Frame.DH(a / 1000, alpha, d / 1000, np.deg2rad(offset))
-            self.chain.addSegment(kdl.Segment(kdl.Joint(kdl.Joint.RotZ), link))
-        T = T_n_tip @ tip_transform(version, frame)
-        self.chain.addSegment(kdl.Segment(fixed, self._frame(T)))
-        self.solver = kdl.ChainFkSolverPos_recursive(self.chain)
-
-    def _frame(self, T: np.ndarray) -> Any:
-        rotation = self.kdl.Rotation(*T[:3, :3].ravel().tolist())
-        return self.kdl.Frame(rotation, self.kdl.Vector(*T[:3, 3].tolist()))
-
-    def forward(self, q: np.ndarray) -> np.ndarray:
-        joints, frame = self.kdl.JntArray(len(q)), self.kdl.Frame()
-        for i, position in enumerate(q):
-            joints[i] = position
-        assert self.solver.JntToCart(joints, frame) >= 0
-        return np.array([[frame[i, j] for j in range(4)] for i in range(3)] + [[0, 0, 0, 1]])
-
-
 def translation(x: float, y: float, z: float) -> np.ndarray:
     return np.array([[1, 0, 0, x], [0, 1, 0, y], [0, 0, 1, z], [0, 0, 0, 1.0]])
 
@@ -150,7 +121,7 @@ def basic_product(a: float, d: float, alpha: float, theta: float) -> np.ndarray:
 
 
 class HandMadeArm:
-    """A printed table multiplied out, where neither of the libraries is installed."""
+    """A printed table multiplied out, where Pinocchio is not installed."""
 
     def __init__(self, name: str, version: str, frame: str) -> None:
         self.T_root_0, self.rows, self.T_n_tip = TABLES[name, version]
@@ -165,11 +136,17 @@ class HandMadeArm:
 
 def product(chain: Chain, q: Sequence[float]) -> np.ndarray:
     """Return T_root_tip of any chain, each row as the product of its four basic transforms."""
-    T, positions = np.array(chain.T_root_0), iter(q)
+    positions = dict(zip(chain.joint_names, q, strict=True))
+    named = {link.joint for link in chain.links}
+    others = iter([name for name in chain.joint_names if name not in named])
+    T = np.array(chain.T_root_0)
     for link in chain.links:
-        moved = 0.0 if link.joint_type == 'fixed' else link.sign * next(positions)
-        turn, slide = (0.0, moved) if link.joint_type == 'prismatic' else (moved, 0.0)
-        T = T @ basic_product(link.a, link.d + slide, link.alpha, link.offset + turn)
+        theta, d = link.offset, link.d
+        if link.joint_type != 'fixed':
+            moved = link.gain * positions[link.joint or next(others)]
+            theta += moved if link.joint_type == 'revolute' else 0.0
+            d += moved if link.joint_type == 'prismatic' else 0.0
+        T = T @ basic_product(link.a, d, link.alpha, theta)
     return T @ chain.T_n_tip
 
 

@@ -1,0 +1,133 @@
+"""What a set of values gives, or why it is refused; the node and `leg_fk bag` take the same."""
+
+from icub_leg_fk.errors import ParameterError
+from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.stream.configuration import Configuration
+import pytest
+
+ARMS = """
+units: {length: m, angle: rad}
+chains:
+  arm:
+    tip: hand
+    root_frame: base
+    joints: [lift]
+    tip_frames: {flange: {frame: arm_flange}, tool: {frame: arm_tool}}
+    versions: &both
+      a: &rows {links: [{type: prismatic, a: 0, d: 0.1, alpha: 0, range: [0, 0.2]}]}
+      b: *rows
+  crane:
+    tip: hook
+    root_frame: base
+    joints: [lift]
+    tip_frames: {hook: {frame: crane_hook}}
+    default_version: b
+    versions: *both
+"""
+
+
+@pytest.fixture(scope='module')
+def shipped():
+    return Catalog.load()
+
+
+@pytest.fixture(scope='module')
+def arms(tmp_path_factory):
+    file = tmp_path_factory.mktemp('arms') / 'arms.yaml'
+    file.write_text(ARMS)
+    return Catalog.load(file)
+
+
+def frames(configuration):
+    """Return each chain with its version, and the frame of its poses."""
+    return {f'{chain.name}={chain.version}': chain.frame_id for chain in configuration.chains}
+
+
+def test_the_defaults_are_both_legs_in_the_axes_of_the_table(shipped):
+    configuration = Configuration.checked(shipped)
+    assert frames(configuration) == {
+        'left_leg=v2_5': 'l_foot_dh_frame', 'right_leg=v2_5': 'r_foot_dh_frame'}
+    assert (configuration.notes, configuration.warnings) == ((), ())
+    assert (configuration.frame_prefix, configuration.joint_timeout) == ('', 0.5)
+    assert not configuration.stamp_now
+    assert not (configuration.publish_tf or configuration.publish_twist
+                or configuration.publish_markers)
+
+
+@pytest.mark.parametrize(('chains', 'version', 'expected'), [
+    (['left_leg', 'right_leg'], 'v1', ['left_leg=v1', 'right_leg=v1']),
+    (['left_leg=v1', 'right_leg'], '', ['left_leg=v1', 'right_leg=v2_5']),
+    (['right_leg=v2_5', 'left_leg'], 'v1', ['right_leg=v2_5', 'left_leg=v1']),
+    (['left_leg', 'head_imu=v2'], 'v1', ['left_leg=v1', 'head_imu=v2']),
+    (['left_leg', 'head_imu'], '', ['left_leg=v2_5', 'head_imu=v2']),
+], ids=str)
+def test_a_version_is_of_all_chains_or_of_one(shipped, chains, version, expected):
+    configuration = Configuration.checked(shipped, chains=chains, version=version)
+    assert list(frames(configuration)) == expected
+
+
+def test_the_frame_is_one_of_the_tip(shipped, arms):
+    configuration = Configuration.checked(shipped, foot_frame='sole')
+    assert list(frames(configuration).values()) == ['l_sole', 'r_sole']
+    configuration = Configuration.checked(arms, chains=['arm=a'], foot_frame='tool')
+    assert frames(configuration) == {'arm=a': 'arm_tool'}
+    assert configuration.notes == ()
+
+
+def test_a_chain_with_one_frame_gives_that_and_says_so(shipped, arms):
+    configuration = Configuration.checked(
+        shipped, chains=['left_leg', 'head_imu'], foot_frame='sole', frame_prefix='icub1/')
+    assert frames(configuration) == {'left_leg=v2_5': 'l_sole', 'head_imu=v2': 'imu_frame'}
+    assert configuration.notes == ('head_imu has no sole frame; its pose is that of '
+                                   'icub1/imu_frame',)
+    configuration = Configuration.checked(arms, chains=['crane'], foot_frame='tool')
+    assert frames(configuration) == {'crane=b': 'crane_hook'}
+
+
+def test_without_a_choice_the_first_frame_counts_which_is_said(arms):
+    configuration = Configuration.checked(arms, chains=['arm=b', 'crane=a'])
+    assert frames(configuration) == {'arm=b': 'arm_flange', 'crane=a': 'crane_hook'}
+    assert configuration.notes == (
+        'arm has no dh frame; its pose is that of arm_flange',
+        'crane has no dh frame; its pose is that of crane_hook')
+
+
+@pytest.mark.parametrize(('values', 'refused'), [
+    ({'version': 'v9'}, "version: unknown version of chain left_leg 'v9'; known: v1, v2_5, v3"),
+    ({'version': 'V1'}, 'version: unknown version of chain left_leg'),
+    ({'chains': ['left_leg', 'head_imu'], 'version': 'v1'}, 'as in head_imu=v'),
+    ({'chains': ['left_leg=v7']}, "chains: unknown version of chain left_leg 'v7'"),
+    ({'chains': ['lef_leg']}, "chains: unknown chain 'lef_leg'; did you mean 'left_leg'?"),
+    ({'chains': []}, 'chains: no chain is named; allowed: one or more of left_leg, right_leg'),
+    ({'chains': ['left_leg', 'left_leg=v1']}, 'chains: chain left_leg is named twice'),
+    ({'chains': ['left_leg=v3', 'right_leg']}, 'chains: left_leg=v3 and right_leg=v2_5 do not go'),
+    ({'foot_frame': 'toe'}, "foot_frame: found 'toe', allowed: dh or sole"),
+    ({'frame_prefix': 'a b'}, "frame_prefix: found 'a b', allowed: printable"),
+    ({'frame_prefix': '/icub1/'}, "frame_prefix: found '/icub1/', allowed: .* no leading slash"),
+    ({'joint_timeout': -0.1}, 'joint_timeout: found -0.1, allowed: 0 to 1e'),
+    ({'joint_timeout': 1.1e6}, 'joint_timeout: found 1100000.0'),
+    ({'joint_timeout': float('nan')}, 'joint_timeout: found nan'),
+    ({'joint_timeout': float('inf')}, 'joint_timeout: found inf'),
+    ({'stamp_source': 'later'}, "stamp_source: found 'later', allowed: message or now"),
+], ids=str)
+def test_a_value_that_cannot_be_used_is_refused_with_the_choices(shipped, values, refused):
+    with pytest.raises(ParameterError, match=f'^parameter .*{refused}') as error:
+        Configuration.checked(shipped, **values)
+    assert '\n' not in str(error.value)
+
+
+def test_a_chain_without_a_default_version_needs_one(arms):
+    with pytest.raises(ParameterError, match=r'^parameter version: chain arm has .* a, b'):
+        Configuration.checked(arms, chains=['arm'])
+
+
+def test_the_limits_of_the_timeout_are_allowed(shipped):
+    for seconds in (0.0, 1e6):
+        assert Configuration.checked(shipped, joint_timeout=seconds).joint_timeout == seconds
+
+
+def test_what_is_doubtful_in_the_file_is_passed_on(tmp_path):
+    file = tmp_path / 'long.yaml'
+    file.write_text(ARMS.replace('d: 0.1', 'd: 1000'))
+    configuration = Configuration.checked(Catalog.load(file), chains=['crane'])
+    assert any('1000 m is unlikely' in line for line in configuration.warnings)
