@@ -160,7 +160,7 @@ def test_what_strangers_send_is_not_hoarded(robot):
     robot.send(0, BOTH)
     tracemalloc.start()
     for i in range(20):
-        many_names = (*LEFT, f'{i}', *(f'{i}.{j}' for j in range(2000)))
+        many_names = (*LEFT, f'{i}', *(f'{i}.{j}' for j in range(500)))
         assert robot.ready(1, many_names, frame_id='y' * (50_000 + i)) == ['left_leg']
         assert robot.ready(1, (*LEFT, f'{i}', 'x' * (100_000 + i))) == ['left_leg']
         assert robot.ready(1, (*LEFT[:3], f'{i}')) == ['left_leg']
