@@ -19,6 +19,9 @@ from icub_leg_fk.errors import (
 from icub_leg_fk.kinematics.chain import Chain
 from icub_leg_fk.kinematics.frozen import Frozen
 from icub_leg_fk.kinematics.kinematics_file import ChainEntry, listed, read_kinematics_file
+from icub_leg_fk.kinematics.urdf_chains import doubts, UrdfChains
+from icub_leg_fk.kinematics.urdf_file import Urdf
+from icub_leg_fk.kinematics.yaml_fields import MAX_BYTES
 
 PACKAGE = 'icub_leg_fk'
 SHIPPED_FILE = 'icub_kinematics.yaml'
@@ -28,7 +31,7 @@ _Thing = TypeVar('_Thing')
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Catalog(Frozen):
-    """Every chain of one kinematics file. Two catalogs with the same chains are equal.
+    """Every chain of one kinematics file or URDF. Two catalogs with the same chains are equal.
 
     Attributes:
         file: path of the file.
@@ -41,14 +44,52 @@ class Catalog(Frozen):
     warnings: tuple[str, ...] = field(default=(), compare=False)
 
     @classmethod
-    def load(cls, path: str | Path | None = None) -> Catalog:
-        """Read a kinematics file; the shipped one if none is given.
+    def load(cls, path: str | Path | None = None, *, root: str | None = None,
+             tolerance: float = 0.0) -> Catalog:
+        """Read a kinematics file or a URDF, known by its content; the shipped file by default.
+
+        Args:
+            path: the file.
+            root: of a URDF, the link that poses are given in; `root_link` or else the top if
+                None or empty.
+            tolerance: of a URDF, angle up to which its tables are tidied for people [rad]; 0 for
+                exact ones.
 
         Raises:
             CatalogError: the file cannot be read or has a mistake; it names file, line, chain,
                 version, row and field, what was found and what is allowed.
+            InputFileError: the file is a URDF that cannot be read; says why.
+            UnknownNameError: the URDF has no such root link.
         """
-        return cls(*read_kinematics_file(path or config_file(SHIPPED_FILE)))
+        if path is not None and _holds_xml(path):
+            return cls.from_urdf(Urdf.load(path), root=root, tolerance=tolerance)
+        file, chains, lines = read_kinematics_file(path or config_file(SHIPPED_FILE))
+        if root:
+            lines = (*lines, f'{file}: is no URDF; the root link {root!r} is not looked at')
+        return cls(file, chains, lines)
+
+    @classmethod
+    def from_urdf(cls, urdf: Urdf, *, root: str | None = None, tolerance: float = 0.0) -> Catalog:
+        """Return the chains of a URDF: the shipped ones that it has, and those to its links.
+
+        Args:
+            urdf: the robot.
+            root: the link that poses are given in; `root_link` or else the top if None or empty.
+            tolerance: angle up to which the tables are tidied for people [rad]; 0 for exact ones.
+
+        Raises:
+            InputFileError: no root is given, and the URDF has none of its own.
+            UnknownNameError: the URDF has no such root link.
+        """
+        start = root or urdf.root()
+        urdf.check_link(start)
+        chains = UrdfChains(urdf, start, cls.load().chains, tolerance)
+        return cls(urdf.file, chains, doubts(urdf))
+
+    def known(self) -> list[str]:
+        """Return the names of the shipped chains that a URDF has, or of all chains of a file."""
+        chains = self.chains
+        return chains.known() if isinstance(chains, UrdfChains) else list(chains)
 
     def entry(self, chain: str) -> ChainEntry:
         """Return a chain with all its versions.
@@ -125,21 +166,22 @@ class Catalog(Frozen):
 
 
 def load_chain(name: str, version: str | None = None, *, frame: str | None = None,
-               file: str | Path | None = None) -> Chain:
-    """Return a chain of a kinematics file.
+               file: str | Path | None = None, root: str | None = None) -> Chain:
+    """Return a chain of a kinematics file or URDF.
 
     Args:
-        name: chain, such as `left_leg`.
+        name: chain, such as `left_leg`, or a link of a URDF.
         version: version, such as `v2_5`; the file's default if None.
         frame: tip frame, such as `sole`; the chain's first if None.
-        file: kinematics file; the shipped one if None.
+        file: kinematics file or URDF; the shipped kinematics file if None.
+        root: of a URDF, the link that poses are given in; `root_link` or else the top if None.
 
     Raises:
-        CatalogError: the file cannot be read or has a mistake.
+        InputFileError: the file cannot be read or has a mistake.
         UnknownNameError: no such chain, version or tip frame; lists the known ones.
         VersionNeededError: no version is given, and the chain has several and no default.
     """
-    catalog = Catalog.load(file)
+    catalog = Catalog.load(file, root=root)
     for line in catalog.warnings:
         warnings.warn(line, stacklevel=2)
     return catalog.chain(name, version, frame)
@@ -163,6 +205,19 @@ def config_file(name: str) -> Path:
             return place / name
     raise CatalogError(name, 0, 'shipped configuration', 'nothing',
                        'one of ' + ', '.join(map(str, places)))
+
+
+def _holds_xml(path: str | Path) -> bool:
+    """Return whether a file is a URDF, or at least is meant to be one."""
+    try:
+        with open(path, 'rb') as stream:
+            start = stream.read(MAX_BYTES)
+    except (OSError, ValueError):
+        return False  # reading it will say why
+    robot, chains = start.find(b'<robot'), start.find(b'chains:')
+    if start.lstrip().startswith((b'<', b'data:')):
+        return True
+    return robot >= 0 and not 0 <= chains < robot
 
 
 def _named(kind: str, name: str, things: Mapping[str, _Thing]) -> _Thing:

@@ -42,7 +42,7 @@ def _read_only(value: Any) -> Any:
         array = np.array(value, dtype=float)
         array.flags.writeable = False
         return array
-    if isinstance(value, Mapping):
+    if isinstance(value, (dict, MappingProxyType)):
         return MappingProxyType(dict(value))
     if isinstance(value, list):
         return tuple(value)
@@ -50,7 +50,7 @@ def _read_only(value: Any) -> Any:
 
 
 def _picklable(value: Any) -> Any:
-    return dict(value) if isinstance(value, Mapping) else value
+    return dict(value) if isinstance(value, MappingProxyType) else value
 
 
 def _hashable(value: Any) -> Hashable:

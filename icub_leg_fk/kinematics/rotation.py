@@ -60,6 +60,15 @@ def matrix_to_quaternion(rotation: ArrayLike) -> Array:
     return np.asarray(np.where(q[..., 3:] < 0, -q, q) + 0.0)
 
 
+def quaternion_to_matrix(quaternion: ArrayLike) -> Array:
+    """Return the (3, 3) rotation of a (4,) unit quaternion x, y, z, w."""
+    x, y, z, w = np.asarray(quaternion, dtype=float).tolist()
+    return np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+
+
 def reference_quaternion(quaternion: ArrayLike) -> Array:
     """Return the one of q and -q from which the signs of a tip's other orientations are measured.
 
