@@ -4,15 +4,9 @@ import json
 from pathlib import Path
 import sys
 
-<<<<<<< HEAD
 import pytest
 from support.leg_fk_process import assert_one_line_complaint, run_main
 from support.robots import joint, robot
-=======
-from icub_leg_fk.__main__ import main
-import pytest
-from support.leg_fk_process import assert_one_line_complaint, leg_fk
->>>>>>> cli
 
 SHARED = Path(__file__).resolve().parents[3] / 'shared' / 'data' / 'urdf'
 # Robot: nearest version of the legs, largest difference [mm, deg] (FACTS of icub-models).
