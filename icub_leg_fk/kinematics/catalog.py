@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 import sys
 import sysconfig
@@ -83,7 +84,7 @@ class Catalog(Frozen):
         """
         start = root or urdf.root()
         urdf.check_link(start)
-        chains = UrdfChains(urdf, start, cls.load().chains, tolerance)
+        chains = UrdfChains(urdf, start, _shipped_chains(), tolerance)
         return cls(urdf.file, chains, doubts(urdf))
 
     def known(self) -> list[str]:
@@ -163,6 +164,12 @@ class Catalog(Frozen):
 
     def __repr__(self) -> str:
         return f'<Catalog {Path(self.file).name[:40]}: {listed(self.chains)}>'
+
+
+@cache
+def _shipped_chains() -> Mapping[str, ChainEntry]:
+    """Return the shipped chains; reading their file takes longer than making a robot's tables."""
+    return Catalog.load().chains
 
 
 def load_chain(name: str, version: str | None = None, *, frame: str | None = None,
