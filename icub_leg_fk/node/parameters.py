@@ -145,10 +145,9 @@ class NodeParameters:
     def _catalog_at_start(self) -> Catalog | None:
         """Return the catalog of the kinematics file; None if a description is to come."""
         file = self._value('kinematics_file')
-        path = Path(file).expanduser() if file else None
         if not self.description_is_source:
-            return self._read_from_root(lambda root: Catalog.load(path, root=root))
-        if path:
+            return self._read_from_root(lambda root: load_catalog(file, root))
+        if file:
             raise ParameterError('description_from_topic', 'found true beside kinematics_file '
                                  f'{file!r}; allowed: one of them')
         return None
@@ -257,6 +256,17 @@ class NodeParameters:
             self.configuration = self._candidate
             self._candidate = None
             self._apply(self.configuration)
+
+
+def load_catalog(kinematics_file: str, root_frame: str = '') -> Catalog:
+    """Return the catalog that values of these parameters name.
+
+    Raises:
+        InputFileError: the file cannot be used.
+        UnknownNameError: it is a URDF without such a link.
+    """
+    path = Path(kinematics_file).expanduser() if kinematics_file else None
+    return Catalog.load(path, root=root_frame)
 
 
 def configuration_of(catalog: Catalog | None, values: Mapping[str, Any]) -> Configuration:

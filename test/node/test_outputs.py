@@ -155,9 +155,9 @@ def test_skeletons_go_through_the_frames_of_each_leg_to_the_outline_of_its_sole(
             assert marker.header.frame_id == 'x/root_link'
             assert (marker.header.stamp.sec, marker.header.stamp.nanosec) == (1, 0)
             assert (marker.action, marker.color.a) == (Marker.ADD, 1.0)
-        bones, joints, sole = by_chain[chain]
-        assert (bones.type, joints.type, sole.type) == (
-            Marker.LINE_STRIP, Marker.SPHERE_LIST, Marker.LINE_STRIP)
+        bones, joints, name, sole = by_chain[chain]
+        assert (bones.type, joints.type, name.type, sole.type) == (
+            Marker.LINE_STRIP, Marker.SPHERE_LIST, Marker.TEXT_VIEW_FACING, Marker.LINE_STRIP)
         frames = Catalog.load().chain(chain, 'v2_5', 'sole').frames(Q[part])
         foot = oracle_pose(chain, 'v2_5', Q[part])[:3, 3]
         for marker in (bones, joints):

@@ -1,6 +1,7 @@
 """Starting with bad arguments, and stopping at any moment."""
 
 from concurrent.futures import ThreadPoolExecutor
+from importlib.util import find_spec
 import os
 from pathlib import Path
 import shlex
@@ -90,6 +91,11 @@ def test_bad_argument_is_refused_in_one_line(refused, arguments):
 def test_parameter_that_the_node_does_not_have_is_refused_on_the_command_line(refused, name):
     line = refused('--ros-args', '-p', f'{name}:={OTHERS_PARAMETERS[name]}')
     assert 'unknown' in line
+
+
+@pytest.mark.skipif(find_spec('tf2_msgs') is not None, reason='tf2_msgs is installed')
+def test_transforms_without_tf2_msgs_are_refused(refused):
+    assert 'tf2_msgs' in refused('--ros-args', '-p', 'publish_tf:=true')
 
 
 def test_refusal_is_exit_code_one_and_no_traceback():
