@@ -75,6 +75,9 @@ class Description:
         if self._fault:
             return [self._fault_note()]
         notes = []
+        if self._use and self._urdf:
+            notes.append(Note('description', '', INFO, 'computing with the description of '
+                              f'{self._urdf.name} on {self.topic}'))
         for chain, (text, is_far) in self._comparisons.items():
             if is_far:
                 way = f'{PARAMETER}:=true computes with the description on {self.topic}'
