@@ -159,7 +159,8 @@ class Catalog(Frozen):
             is_for_all = name in self.chains and error.name == version
             if not is_for_all:
                 raise
-            advice = f'a version of its own is given as in {name}={error.choices[-1]}'
+            example = self.chains[name].default_version or error.choices[-1]
+            advice = f'a version of its own is given as in {name}={example}'
             raise UnknownNameError(error.kind, error.name, error.choices, advice) from error
 
     def __repr__(self) -> str:

@@ -1,7 +1,7 @@
 """ROS messages to and from their CDR bytes (OMG CDR, as rosidl lays them out); free of rclpy.
 
-Read are sensor_msgs/JointState and std_msgs/String, bounds-checked, since their bytes come from the
-network: every length is compared with what is there before anything is read or allocated. The
+Read are sensor_msgs/JointState and std_msgs/String, bounds-checked, since their bytes come from
+the network: every length is compared with what is there before anything is read or allocated. The
 fields of a JointState are encapsulation (4 bytes), stamp sec and nanosec, frame_id, name[],
 position[], velocity[], effort[]; alignment counts from the fifth byte. Padding may hold anything:
 Fast CDR leaves in it what was in the buffer before. What Fast CDR takes and this refuses:

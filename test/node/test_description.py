@@ -11,42 +11,57 @@ from std_msgs.msg import String
 from support.described_robots import needs_real_robots, own_description, pinocchio_pose, REAL
 from support.node_harness import BOTH, FEET, LEFT, LOSSLESS, NodeProcess, Robot, SECOND
 from support.node_oracle import oracle_pose, pose_matrix
-from support.robots import joint, robot as robot_of
+from support.robots import joint as a_joint
+from support.robots import robot as robot_of
 
 OK, WARN, ERROR, STALE = (
     DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR, DiagnosticStatus.STALE)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 Q = [0.2, 0.1, -0.1, -0.5, -0.3, 0.1, 0.15, 0.05, 0.1, -0.4, -0.2, -0.1]
-CRANE = robot_of([joint(0), joint(1)])
+CRANE = robot_of([a_joint(0), a_joint(1)])
 GOOD = own_description('v2_5')
 
 
 class DescribedRobot(Robot):
-    """A robot that also sends descriptions of itself."""
+    """A robot that also sends descriptions of itself, and reads what the node says."""
 
     def __init__(self, node):
         super().__init__(node)
         self.descriptions = self.node.create_publisher(String, 'robot_description', LATCHED)
-        self.stamp = SECOND
+        self.topic = f'{node.namespace}/robot_description'
+        self.wait_for_log = node.wait_for_log
+        self._log = node.log
+        self._stamp = SECOND
 
     def describe(self, text):
         self.descriptions.publish(String(data=text))
 
     def poses_now(self):
-        """Send a joint state; return the (4, 4) poses of both feet that answer it."""
-        self.stamp += SECOND // 1000
-        self.send(self.stamp, BOTH, Q)
-        return [pose_matrix(self.take(self.poses[tip], self.stamp)[-1].pose) for tip in FEET]
+        """Return the (4, 4) poses of both feet that answer a joint state."""
+        self._stamp = self.connect(self._stamp) + 1000
+        self.send(self._stamp, BOTH, Q)
+        return [pose_matrix(self.take(self.poses[tip], self._stamp)[-1].pose) for tip in FEET]
 
-    def now(self):
-        self.send(self.node.get_clock().now().nanoseconds, BOTH, Q)
+    def send_now(self, joint_prefix=''):
+        names = [joint_prefix + name for name in BOTH]
+        self.send(self.node.get_clock().now().nanoseconds, names, Q)
 
     def wait_for_status(self, level, words):
-        """Return the values of the left leg's status, once it has this level and these words."""
+        """Wait until the left leg's status has this level and these words."""
         def is_so(statuses):
             status = statuses['left_leg']
             return status.level == level and words in status.message
-        return self.statuses(is_so, meanwhile=self.now)['left_leg'].values
+        self.statuses(is_so, meanwhile=self.send_now)
+
+    def wait_for_value(self, words):
+        """Wait until the left leg's status says this of the description."""
+        self.statuses(lambda statuses: words in statuses['left_leg'].values['description'],
+                      meanwhile=self.send_now)
+
+    def said(self, severity):
+        """Return what the node has said, from the text on."""
+        marked = [line for line in self._log().splitlines() if f'[{severity}]' in line]
+        return [line.partition('foot_pose_publisher]: ')[2] for line in marked]
 
 
 def assert_poses(found, text, tips=('l_foot_dh_frame', 'r_foot_dh_frame')):
@@ -67,72 +82,57 @@ def mm_between_versions():
     return max(off)
 
 
-def lines(node, severity):
-    marked = [line for line in node.log().splitlines() if f'[{severity}]' in line]
-    return [line.partition('foot_pose_publisher]: ')[2] for line in marked]
-
-
 @pytest.fixture(scope='module')
 def waiting():
-    """Return a node that computes with the description, and a robot."""
+    """Return a robot whose node computes with the description that it sends."""
     with NodeProcess({'description_from_topic': True, **LOSSLESS}) as node, \
             DescribedRobot(node) as robot:
-        yield node, robot
+        yield robot
 
 
 @pytest.fixture
 def described(waiting):
-    """Return that node and that robot, once poses come."""
-    node, robot = waiting
-    robot.describe(GOOD)
-    robot.stamp = robot.connect(robot.stamp)
-    return node, robot
+    """Return that robot, once it has sent a good description."""
+    waiting.describe(GOOD)
+    waiting.wait_for_value('robot_v2_5')
+    return waiting
 
 
 def test_it_waits_aloud(waiting):
-    node, robot = waiting
-    topic = f'{node.namespace}/robot_description'
-    node.wait_for_log(f'waiting for the description of the robot on {topic} to publish poses of '
-                      'left_leg, right_leg')
-    robot.wait_for_status(STALE, f'no description of the robot has come on {topic}; it has 1 pub')
-    node.wait_for_log('WARN')
-    assert any('no description of the robot has come' in line for line in lines(node, 'WARN'))
-    assert not robot.left
-    result = robot.change(version='v1')
+    waiting.wait_for_log('waiting for the description of the robot on '
+                         f'{waiting.topic} to publish poses of left_leg, right_leg')
+    silence = f'no description of the robot has come on {waiting.topic}; it has 1 publisher'
+    waiting.wait_for_status(STALE, silence)
+    waiting.wait_for_log(silence)
+    assert not waiting.left
+    result = waiting.change(version='v1')
     assert not result.successful
-    assert "version: found 'v1', allowed with description_from_topic: none, or urdf" in \
-        result.reason
+    assert "version: found 'v1', allowed with description_from_topic: none" in result.reason
 
 
 def test_poses_are_those_of_the_description_and_a_new_one_takes_effect(described):
-    node, robot = described
-    assert_poses(robot.poses_now(), GOOD)
-    robot.describe(own_description('v1'))
-    robot.statuses(lambda statuses: statuses['left_leg'].values['description'] == 'robot_v1',
-                   meanwhile=robot.now)
-    robot.stamp = robot.connect(robot.stamp)
-    poses = robot.poses_now()
-    assert_poses(poses, own_description('v1'))
+    assert_poses(described.poses_now(), GOOD)
+    other = own_description('v1')
+    described.describe(other)
+    described.wait_for_value('robot_v1')
+    poses = described.poses_now()
+    assert_poses(poses, other)
     np.testing.assert_allclose(poses[0], oracle_pose('left_leg', 'v1', Q[:6]), rtol=0, atol=1e-9)
-    said = lines(node, 'INFO')
+    said = described.said('INFO')
     assert any('(left_leg=urdf, root_link to l_foot_dh_frame)' in line for line in said)
     for name in ('robot_v2_5', 'robot_v1'):
-        assert f'computing with the description of {name} on {node.namespace}/robot_description' \
-            in said
+        assert f'computing with the description of {name} on {described.topic}' in said
 
 
 @needs_real_robots
 @pytest.mark.parametrize('name', ['iCubGenova04', 'iCubGenova09'])
 def test_poses_of_real_robots(described, name):
-    node, robot = described
     text = REAL[name].read_text()
-    assert robot.change(foot_frame='sole').successful
-    robot.describe(text)
-    robot.statuses(lambda statuses: statuses['left_leg'].values['description'] == 'iCub',
-                   meanwhile=robot.now)
-    robot.stamp = robot.connect(robot.stamp)
-    assert_poses(robot.poses_now(), text, ('l_sole', 'r_sole'))
-    assert robot.change(foot_frame='dh').successful
+    assert described.change(foot_frame='sole').successful
+    described.describe(text)
+    described.wait_for_value('iCub')
+    assert_poses(described.poses_now(), text, ('l_sole', 'r_sole'))
+    assert described.change(foot_frame='dh').successful
 
 
 @pytest.mark.parametrize(('bad', 'fault'), [
@@ -142,74 +142,70 @@ def test_poses_of_real_robots(described, name):
     (own_description('v2_5', 'left_leg'), "unknown chain 'right_leg'"),
 ], ids=['half', 'empty', 'another robot', 'one leg'])
 def test_one_that_cannot_be_used_changes_nothing(described, bad, fault):
-    node, robot = described
-    before = robot.poses_now()
-    errors = len(lines(node, 'ERROR'))
-    robot.describe(bad)
-    robot.wait_for_status(ERROR, 'description of the robot not used')
-    error, = lines(node, 'ERROR')[errors:]
+    errors = len(described.said('ERROR'))
+    described.describe(bad)
+    described.wait_for_status(ERROR, 'description of the robot not used')
+    error, = described.said('ERROR')[errors:]
     assert fault in error
     assert error.endswith('; the one before stays')
-    robot.stamp = robot.connect(robot.stamp)
-    np.testing.assert_array_equal(robot.poses_now(), before)
-    robot.describe(GOOD)
-    robot.wait_for_status(OK, 'publishing')
+    assert_poses(described.poses_now(), GOOD)
+    described.describe(GOOD)
+    described.wait_for_status(OK, 'publishing')
 
 
 def test_a_second_publisher_is_a_warning(described):
-    node, robot = described
-    other = Node('other', namespace=node.namespace, context=robot.node.context)
+    namespace = described.node.get_namespace()
+    other = Node('other', namespace=namespace, context=described.node.context)
     other.create_publisher(String, 'robot_description', LATCHED)
-    robot.wait_for_status(WARN, f'{node.namespace}/robot_description has 2 publishers, and the '
-                          f'last description counts: {node.namespace}/other, ')
+    described.wait_for_status(WARN, f'{described.topic} has 2 publishers, and the last '
+                              f'description counts: {namespace}/other, {namespace}/robot')
     other.destroy_node()
 
 
 @pytest.fixture(scope='module')
 def with_tables():
-    """Return a node that computes with tables, and a robot."""
+    """Return a robot whose node computes with tables, and looks for joints under a prefix."""
     with NodeProcess({'joint_prefix': 'icub1/', **LOSSLESS}) as node, \
             DescribedRobot(node) as robot:
-        yield node, robot
+        yield robot
 
 
 def test_tables_are_held_against_the_description(with_tables):
-    node, robot = with_tables
+    robot = with_tables
     robot.describe(GOOD)
-    node.wait_for_log("right_leg: r_foot_dh_frame is up to 0.00 mm and 0.00 deg off the robot's")
+    robot.wait_for_log("right_leg: r_foot_dh_frame is up to 0.00 mm and 0.00 deg off the robot's")
     robot.describe(own_description('v1'))
-    way = (f'; description_from_topic:=true computes with the description on {node.namespace}'
-           '/robot_description')
-    node.wait_for_log(f'right_leg: r_foot_dh_frame is up to {mm_between_versions():.2f} mm')
-    node.wait_for_log(way)
-    far = [line for line in lines(node, 'WARN') if way in line]
-    assert [line.partition(':')[0] for line in far] == ['left_leg', 'right_leg']
-    assert f'l_foot_dh_frame is up to {mm_between_versions():.2f} mm and 0.00 deg off' in far[0]
+    off = f'_foot_dh_frame is up to {mm_between_versions():.2f} mm and 0.00 deg off the robot'
+    robot.wait_for_log(f'right_leg: r{off}')
+    way = f"'s own; description_from_topic:=true computes with the description on {robot.topic}"
+    robot.wait_for_log(way)
+    assert [line for line in robot.said('WARN') if way in line] == [
+        f'left_leg: l{off}{way}', f'right_leg: r{off}{way}']
     assert robot.change(version='v1').successful
-    node.wait_for_log('left_leg=v1')
-    values = robot.statuses(lambda statuses: True)['left_leg'].values
-    assert values['description'].startswith('l_foot_dh_frame is up to 0.00 mm')
+    robot.wait_for_value('l_foot_dh_frame is up to 0.00 mm')
     assert robot.change(version='').successful
 
 
 def test_a_difference_from_the_description_changes_no_level(with_tables):
-    node, robot = with_tables
-    robot.describe(own_description('v1'))
-
-    def send():
-        names = [f'icub1/{name}' for name in BOTH]
-        robot.send(robot.node.get_clock().now().nanoseconds, names, Q)
-
+    with_tables.describe(own_description('v1'))
     far = f'up to {mm_between_versions():.2f} mm'
 
     def are_compared(statuses):
         status = statuses['left_leg']
         return far in status.values['description'] and status.level == OK
-    robot.statuses(are_compared, meanwhile=send)
+    with_tables.statuses(are_compared, meanwhile=lambda: with_tables.send_now('icub1/'))
 
 
 def test_joint_names_without_the_prefix_are_explained(with_tables):
-    node, robot = with_tables
-    robot.statuses(lambda statuses: 'never seen' not in statuses['left_leg'].message
-                   and 'is looked for with joint_prefix:=""' in statuses['left_leg'].message,
-                   meanwhile=lambda: robot.send(SECOND, LEFT, Q[:6]))
+    with_tables.wait_for_status(ERROR, "; 'l_hip_pitch' is looked for with joint_prefix:=\"\"")
+
+
+def test_a_urdf_is_a_kinematics_file(tmp_path):
+    robots, parameters = tmp_path / 'robot.urdf', tmp_path / 'parameters.yaml'
+    robots.write_text(GOOD)
+    parameters.write_text('/**: {ros__parameters: {root_frame: odom}}')
+    with NodeProcess({'kinematics_file': str(robots), **LOSSLESS},
+                     ['--params-file', str(parameters)]) as node, DescribedRobot(node) as robot:
+        assert_poses(robot.poses_now(), GOOD)
+        [warning] = robot.said('WARN')
+    assert warning.startswith(f"root_frame not used: unknown link of {robots} 'odom'; known: ")
