@@ -135,7 +135,8 @@ def viewer(node: str, params_file: str, given: Mapping[str, Any]) -> list[Node]:
             values |= parameters_for(params_file, node)
         values |= given
         ours = {parameter.name: values[parameter.name] for parameter in PARAMETERS}
-        configuration = configuration_of(load_catalog(ours['kinematics_file']), ours)
+        catalog = load_catalog(ours['kinematics_file'], ours['root_frame'])
+        configuration = configuration_of(catalog, ours)
     except (LegFKError, TypeError, AttributeError):  # the node says what is wrong
         return []
     try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 import sys
 import sysconfig
@@ -83,7 +84,7 @@ class Catalog(Frozen):
         """
         start = root or urdf.root()
         urdf.check_link(start)
-        chains = UrdfChains(urdf, start, cls.load().chains, tolerance)
+        chains = UrdfChains(urdf, start, _shipped_chains(), tolerance)
         return cls(urdf.file, chains, doubts(urdf))
 
     def known(self) -> list[str]:
@@ -160,11 +161,18 @@ class Catalog(Frozen):
             is_for_all = name in self.chains and error.name == version
             if not is_for_all:
                 raise
-            advice = f'a version of its own is given as in {name}={error.choices[-1]}'
+            example = self.chains[name].default_version or error.choices[-1]
+            advice = f'a version of its own is given as in {name}={example}'
             raise UnknownNameError(error.kind, error.name, error.choices, advice) from error
 
     def __repr__(self) -> str:
         return f'<Catalog {Path(self.file).name[:40]}: {listed(self.chains)}>'
+
+
+@cache
+def _shipped_chains() -> Mapping[str, ChainEntry]:
+    """Return the shipped chains; reading their file takes longer than making a robot's tables."""
+    return Catalog.load().chains
 
 
 def load_chain(name: str, version: str | None = None, *, frame: str | None = None,

@@ -18,11 +18,13 @@ Subscribes to joint_states (sensor_msgs/JointState) and publishes the poses of t
 
 examples:
   foot_pose_publisher --ros-args -p version:=v2_5
+  foot_pose_publisher --ros-args -p description_from_topic:=true
   foot_pose_publisher --ros-args -p chains:="[left_leg, head_imu=v2]" -p foot_frame:=sole
   foot_pose_publisher --ros-args --params-file foot_pose_publisher.yaml
 
-parameters: chains, version, kinematics_file, foot_frame, frame_prefix, joint_timeout,
-stamp_source, publish_tf, publish_twist, publish_markers. While the node runs, this explains each:
+parameters: chains, version, kinematics_file, description_from_topic, root_frame, joint_prefix,
+foot_frame, frame_prefix, joint_timeout, stamp_source, publish_tf, publish_twist,
+publish_markers. While the node runs, this explains each:
   ros2 param describe /foot_pose_publisher NAME
 """
 

@@ -1,11 +1,12 @@
 """ROS messages to and from their CDR bytes (OMG CDR, as rosidl lays them out); free of rclpy.
 
-Read is sensor_msgs/JointState, bounds-checked, since its bytes come from the network: every length
-is compared with what is there before anything is read or allocated. Its fields are encapsulation
-(4 bytes), stamp sec and nanosec, frame_id, name[], position[], velocity[], effort[]; alignment
-counts from the fifth byte. Padding may hold anything: Fast CDR leaves in it what was in the buffer
-before. What Fast CDR takes and this refuses: encapsulations other than plain CDR, in which no ROS
-middleware sends a JointState; a string without NUL at its end, or with one before it.
+Read are sensor_msgs/JointState and std_msgs/String, bounds-checked, since their bytes come from
+the network: every length is compared with what is there before anything is read or allocated. The
+fields of a JointState are encapsulation (4 bytes), stamp sec and nanosec, frame_id, name[],
+position[], velocity[], effort[]; alignment counts from the fifth byte. Padding may hold anything:
+Fast CDR leaves in it what was in the buffer before. What Fast CDR takes and this refuses:
+encapsulations other than plain CDR, in which no ROS middleware sends these; a string without NUL
+at its end, or with one before it.
 
 Written are PoseStamped, TwistStamped and TFMessage, little-endian: all but stamps and numbers is
 prepared once.
@@ -13,7 +14,7 @@ prepared once.
 
 from collections.abc import Sequence
 import struct
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 from icub_leg_fk.errors import MalformedMessageError
 from icub_leg_fk.kinematics.solver import Pose
@@ -63,7 +64,7 @@ def read_layout(data: bytes) -> JointStateLayout:
         MalformedMessageError: the bytes end too early, a length is absurd, or the encoding is
             not plain CDR; names the field.
     """
-    reader = _Reader(data)
+    reader = _Reader(data, 'JointState')
     reader.take('header.stamp', 8)
     frame_id = reader.string('header.frame_id')
     # A string takes at least its length field: no more of them than a quarter of the rest.
@@ -73,6 +74,15 @@ def read_layout(data: bytes) -> JointStateLayout:
     positions, velocities, efforts = map(reader.doubles, ('position', 'velocity', 'effort'))
     return JointStateLayout(reader.byte_order, frame_id, names, padding, names_end,
                             positions, velocities, efforts)
+
+
+def read_string(data: bytes) -> bytes:
+    """Return the text of a serialized String, not decoded: XML itself says how.
+
+    Raises:
+        MalformedMessageError: the bytes are no String.
+    """
+    return _Reader(data, 'String').text('data')
 
 
 class _StampedEncoder:
@@ -135,13 +145,13 @@ class TFMessageEncoder:
 
 
 class _Reader:
-    """A position in the bytes of a JointState that refuses to move past their end."""
+    """A position in the bytes of a message that refuses to move past their end."""
 
-    def __init__(self, data: bytes) -> None:
+    def __init__(self, data: bytes, message: str) -> None:
+        self._message = message
         byte_order = BYTE_ORDERS.get(bytes(data[:2]))
         if byte_order is None:
-            raise MalformedMessageError('JointState', 'has the encapsulation '
-                                        f'0x{data[:2].hex()}; allowed: 0x0000, 0x0001')
+            self._fail(f'has the encapsulation 0x{data[:2].hex()}; allowed: 0x0000, 0x0001')
         self.byte_order = byte_order
         self.padding: list[tuple[int, int]] = []
         self._data = data
@@ -160,8 +170,7 @@ class _Reader:
         start = self._at
         self._at = start + size
         if self._at > len(self._data):
-            raise MalformedMessageError('JointState', f'{field} ends at byte {self._at}; allowed: '
-                                        f'{len(self._data)}')
+            self._fail(f'{field} ends at byte {self._at}; allowed: {len(self._data)}')
         return start
 
     def length(self, field: str, item_size: int) -> int:
@@ -171,19 +180,21 @@ class _Reader:
                                         self.take(field, 4))[0]
         left = len(self._data) - self._at
         if count * item_size > left:
-            raise MalformedMessageError('JointState', f'{field} has {count} items; allowed: what '
-                                        f'fits in the {left} bytes left')
+            self._fail(f'{field} has {count} items; allowed: what fits in the {left} bytes left')
         return count
 
     def string(self, field: str) -> str:
         """Return the string that follows."""
+        return self.text(field).decode('utf-8', 'replace')
+
+    def text(self, field: str) -> bytes:
+        """Return the string that follows, not decoded."""
         size = self.length(field, 1)
         start = self.take(field, size)
         text = self._data[start:self._at]
         if size and text.find(0) != size - 1:
-            raise MalformedMessageError('JointState',
-                                        f'{field} is not a string that ends with NUL')
-        return text[:-1].decode('utf-8', 'replace')
+            self._fail(f'{field} is not a string that ends with NUL')
+        return text[:-1]
 
     def doubles(self, field: str) -> Doubles:
         """Pass over a sequence of numbers."""
@@ -191,6 +202,9 @@ class _Reader:
         if count:
             self.align(8)
         return Doubles(self.take(field, 8 * count), count)
+
+    def _fail(self, fault: str) -> NoReturn:
+        raise MalformedMessageError(self._message, fault)
 
 
 def _string(text: str) -> bytes:

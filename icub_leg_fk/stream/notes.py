@@ -14,6 +14,7 @@ from icub_leg_fk.stream.joint_input import ChainLook, Look, TIME_JUMP
 
 INFO = 'info'
 WARNING = 'warning'
+ERROR = 'error'
 
 _NAMES_SHOWN = 12
 _LONGEST_SHOWN = 40  # characters of a name
@@ -36,7 +37,7 @@ class Note(NamedTuple):
     Attributes:
         key: what it is about, such as `stale_joint`: the same as long as it lasts.
         chain: name of the chain that it is about; empty if it is about all messages.
-        level: INFO or WARNING.
+        level: INFO, WARNING or ERROR.
         text: what there is to say, in a line that does not name the chain.
     """
 
@@ -49,12 +50,13 @@ class Note(NamedTuple):
         return f'{self.chain}: {self.text}' if self.chain else self.text
 
 
-def notes_of(look: Look, topic: str = '') -> list[Note]:
+def notes_of(look: Look, topic: str = '', joint_prefix: str = '') -> list[Note]:
     """Return what there is to say of what happened since the last look.
 
     Args:
         look: what happened.
         topic: the topic on which the messages came; empty if they came otherwise.
+        joint_prefix: what is before the joint names of the chains.
     """
     on_topic = f' on {topic}' if topic else ''
     texts = dict(_of_messages(look, on_topic))
@@ -62,7 +64,7 @@ def notes_of(look: Look, topic: str = '') -> list[Note]:
     for name, chain_look in look.chains.items():
         texts = dict(_of_chain(chain_look))
         texts.update(_of_frame_ids(look, chain_look))
-        texts.update(_of_names(look, chain_look, on_topic))
+        texts.update(_of_names(look, chain_look, on_topic, joint_prefix))
         notes += [Note(key, name, WARNING, texts[key]) for key in texts]
     return notes
 
@@ -131,18 +133,28 @@ def _of_frame_ids(look: Look, chain_look: ChainLook) -> Iterator[tuple[str, str]
             return
 
 
-def _of_names(look: Look, chain_look: ChainLook, on_topic: str) -> Iterator[tuple[str, str]]:
+def _of_names(look: Look, chain_look: ChainLook, on_topic: str, joint_prefix: str
+              ) -> Iterator[tuple[str, str]]:
     """Yield a warning if no joint of a chain has come."""
     joints = chain_look.chain.joint_names
     if not look.names or not look.joints.isdisjoint(joints):
         return
-    pair = _near(joints, look.names)
-    hint = ''
-    if pair:
-        hint = f'; {pair[0]!r} is nearly {pair[1]!r}, but names must be equal'
     yield 'no_match', (
         f'no message{on_topic} has one of its joints ({", ".join(joints)}); names that came: '
-        f'{names_that_came(look)}{hint}')
+        f'{names_that_came(look)}{_hint(joints, look.names, joint_prefix)}')
+
+
+def _hint(joints: Sequence[str], names: Iterable[str], joint_prefix: str) -> str:
+    """Return what may help where no name is that of a joint; empty if nothing is like one."""
+    bare = [joint.removeprefix(joint_prefix) for joint in joints]
+    pair = _near(bare, names)
+    if not pair:
+        return ''
+    name, joint = pair
+    if name.endswith(joint):
+        prefix = name.removesuffix(joint) or '""'
+        return f'; {name!r} is looked for with joint_prefix:={prefix}'
+    return f'; {name!r} is nearly {joint_prefix + joint!r}, but names must be equal'
 
 
 def _near(joints: Sequence[str], names: Iterable[str]) -> tuple[str, str] | None:

@@ -239,7 +239,7 @@ def test_a_terminal_without_utf_8_gets_escapes_instead_of_an_error(tmp_path, mon
     ('leg_fk po', {'pose'}),
     ('leg_fk pose --deg', {'--degrees'}),
     ('leg_fk pose left', {'left_leg'}),
-    ('leg_fk pose head_imu=', {'v2'}),
+    ('leg_fk pose head_imu=', {'v2', 'v3'}),
     ('leg_fk pose left_leg --version v2', {'v2_5'}),
     ('leg_fk urdf left_leg head_imu --version v2', {'v2', 'v2_5'}),
     ('leg_fk pose head_imu --foot-frame ', {'dh'}),

@@ -2,9 +2,11 @@
 
 from dataclasses import replace
 
+from icub_leg_fk.errors import LegFKError
 from icub_leg_fk.kinematics import Catalog, DHLink
 import numpy as np
 import pytest
+from support.described_robots import needs_real_robots, pinocchio_pose, REAL
 
 CATALOG = Catalog.load()
 MIRROR = np.diag([1.0, -1.0, 1.0])  # left and right, in the root frame
@@ -30,6 +32,25 @@ def test_head_sensor_at_zero_is_where_it_is_known_to_be() -> None:
     T = CATALOG.chain('head_imu', 'v2').forward([0] * 6)
     assert T[:3, 3] * 1000 == pytest.approx((13.0, 6.6, 375.6), abs=1e-10)
     assert np.array_equal(T[:3, :3], np.eye(3))
+
+
+def test_version_3_serves_the_whole_robot() -> None:
+    names = ['left_leg', 'right_leg', 'head_imu']
+    chains = CATALOG.select(names, 'v3')
+    assert [(chain.root_frame, chain.root_axes) for chain in chains] == [
+        ('root_link', ('forward', 'left', 'up'))] * 3
+    with pytest.raises(LegFKError, match='head_imu=v2 do not go together'):
+        CATALOG.select([*names[:2], 'head_imu=v2'], 'v3')
+
+
+@needs_real_robots
+def test_the_head_of_version_3_is_that_of_its_robot() -> None:
+    text = REAL['iCubGenova09'].read_text()
+    head = CATALOG.chain('head_imu', 'v3')
+    for q in np.random.default_rng(8).uniform(-1.5, 1.5, (100, 6)):
+        positions = dict(zip(head.joint_names, q, strict=True))
+        expected = pinocchio_pose(text, 'root_link', 'imu_frame', positions)
+        assert head.forward(q) == pytest.approx(expected, abs=1e-12)
 
 
 @pytest.mark.parametrize('version', ['v1', 'v2_5', 'v3'])

@@ -15,6 +15,7 @@ import yaml
 MS = 1_000_000  # ns
 Q = [0.2, 0.1, -0.1, -0.5, -0.3, 0.1, 0.15, 0.05, 0.1, -0.4, -0.2, -0.1]
 DEFAULTS = {parameter.name: parameter.default for parameter in PARAMETERS}
+READ_ONLY = ('chains', 'kinematics_file', 'description_from_topic', 'root_frame', 'joint_prefix')
 LIVE = {parameter.name: parameter.default for parameter in PARAMETERS if parameter.is_live}
 
 
@@ -129,7 +130,7 @@ def test_every_parameter_is_described(feet):
         assert descriptor.description.endswith('.'), descriptor.name
         assert descriptor.additional_constraints, descriptor.name
         assert descriptor.type != ParameterType.PARAMETER_NOT_SET
-        assert descriptor.read_only == (descriptor.name in ('chains', 'kinematics_file'))
+        assert descriptor.read_only == (descriptor.name in READ_ONLY)
     [timeout] = [descriptor for descriptor in described if descriptor.name == 'joint_timeout']
     bounds = timeout.floating_point_range[0]
     assert (bounds.from_value, bounds.to_value) == (0.0, 1e6)

@@ -13,6 +13,7 @@ import time
 from icub_leg_fk.node import main as start
 from icub_leg_fk.node.parameters import PARAMETERS
 import pytest
+from support.described_robots import own_description
 from support.node_harness import BOTH, DEADLINE, LOSSLESS, NodeProcess, Robot, SECOND
 
 INT, TERM = signal.SIGINT, signal.SIGTERM
@@ -35,6 +36,12 @@ BAD = {
     '-p kinematics_file:=/no/such.yaml': 'cannot read /no/such.yaml',
     '-p kinematics_file:=/': 'cannot read /: ',
     '-p kinematics_file:=true': 'parameter kinematics_file: found True, allowed: path of a file',
+    '-p description_from_topic:=true -p kinematics_file:=a.urdf':
+        "parameter description_from_topic: found true beside kinematics_file 'a.urdf'; allowed",
+    '-p description_from_topic:=true -p version:=v1':
+        "parameter version: found 'v1', allowed with description_from_topic: none, or urdf",
+    '-p description_from_topic:=true -p chains:=[]': 'parameter chains: no chain is named',
+    '-p joint_prefix:=3': 'parameter joint_prefix: found 3, allowed: printable characters',
     '-p use_sim_time:=5': "'use_sim_time'",
     '-p versoin:=v1': "unknown parameter 'versoin'; did you mean 'version'?",
     '-p foot_pose_publisher:frame:=dh': "unknown parameter 'frame'",
@@ -98,6 +105,13 @@ def test_transforms_without_tf2_msgs_are_refused(refused):
     assert 'tf2_msgs' in refused('--ros-args', '-p', 'publish_tf:=true')
 
 
+def test_a_root_that_a_urdf_does_not_have_is_refused_on_the_command_line(refused, tmp_path):
+    file = tmp_path / 'robot.urdf'
+    file.write_text(own_description('v2_5'))
+    line = refused('--ros-args', '-p', f'kinematics_file:={file}', '-p', 'root_frame:=base')
+    assert f"parameter root_frame: unknown link of {file} 'base'; known: l_foot_dh_frame" in line
+
+
 def test_refusal_is_exit_code_one_and_no_traceback():
     done = subprocess.run([*RUN, '--ros-args', '-p', 'verson:=v1'], capture_output=True, text=True,
                           timeout=DEADLINE, check=False)
@@ -130,10 +144,10 @@ def test_files_for_all_nodes_and_for_others_are_no_reason_not_to_start(tmp_path)
         log = node.log()
     warnings = [line.partition(']: ')[2] for line in log.splitlines() if '[WARN]' in line]
     assert warnings == [
-        'ignored parameters that this node does not have: tool_frame (did you mean foot_frame?), '
-        'robot_frame (did you mean foot_frame?), publish_marker (did you mean publish_markers?), '
+        'ignored parameters that this node does not have: tool_frame (did you mean root_frame?), '
+        'robot_frame (did you mean root_frame?), publish_marker (did you mean publish_markers?), '
         'robot_description, publish_rate (did you mean publish_tf?), '
-        'tf_prefix (did you mean frame_prefix?), '
+        'tf_prefix (did you mean joint_prefix?), '
         + ', '.join(list(OTHERS_PARAMETERS)[6:]),
         f'nothing was taken from {others}: it is for /other/foot_pose_publisher, and this node is '
         f'{node.namespace}/foot_pose_publisher']

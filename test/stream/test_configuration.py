@@ -1,9 +1,10 @@
 """What a set of values gives, or why it is refused; the node and `leg_fk bag` take the same."""
 
 from icub_leg_fk.errors import ParameterError
-from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.kinematics import Catalog, Urdf
 from icub_leg_fk.stream.configuration import Configuration
 import pytest
+from support.described_robots import own_description
 
 ARMS = """
 units: {length: m, angle: rad}
@@ -102,6 +103,7 @@ def test_without_a_choice_the_first_frame_counts_which_is_said(arms):
     ({'chains': ['left_leg', 'left_leg=v1']}, 'chains: chain left_leg is named twice'),
     ({'chains': ['left_leg=v3', 'right_leg']}, 'chains: left_leg=v3 and right_leg=v2_5 do not go'),
     ({'foot_frame': 'toe'}, "foot_frame: found 'toe', allowed: dh or sole"),
+    ({'joint_prefix': 'a\nb'}, r"joint_prefix: found 'a\\nb', allowed: printable characters"),
     ({'frame_prefix': 'a b'}, "frame_prefix: found 'a b', allowed: printable"),
     ({'frame_prefix': '/icub1/'}, "frame_prefix: found '/icub1/', allowed: .* no leading slash"),
     ({'joint_timeout': -0.1}, 'joint_timeout: found -0.1, allowed: 0 to 1e'),
@@ -114,6 +116,37 @@ def test_a_value_that_cannot_be_used_is_refused_with_the_choices(shipped, values
     with pytest.raises(ParameterError, match=f'^parameter .*{refused}') as error:
         Configuration.checked(shipped, **values)
     assert '\n' not in str(error.value)
+
+
+def test_joints_are_looked_for_under_their_prefix(shipped, tmp_path):
+    configuration = Configuration.checked(shipped, chains=['left_leg'], joint_prefix='icub 1/')
+    leg, = configuration.chains
+    bare = shipped.chain('left_leg')
+    assert leg.joint_names == tuple(f'icub 1/{name}' for name in bare.joint_names)
+    assert leg.pose([0.1] * 6) == bare.pose([0.1] * 6)
+    file = tmp_path / 'led.yaml'
+    row = '{type: prismatic, a: 0, d: 0.1, alpha: 0, joint: lift'
+    file.write_text(ARMS.replace('{type: prismatic, a: 0, d: 0.1, alpha: 0', f'{row}}}, {row}'))
+    arm, = Configuration.checked(Catalog.load(file), chains=['arm=a'], joint_prefix='x').chains
+    assert [row.joint for row in arm.rows()] == ['xlift', 'xlift']
+
+
+def test_two_chains_with_the_topics_of_one_are_refused():
+    text = own_description('v2_5').replace('l_sole', 'sole one').replace('r_sole', 'sole-one')
+    catalog = Catalog.from_urdf(Urdf.parse(text.encode(), 'robot.urdf'))
+    refused = 'sole one and sole-one have the same tip, sole_one, and so the same topics'
+    with pytest.raises(ParameterError, match=refused):
+        Configuration.checked(catalog, chains=['sole one', 'sole-one'])
+
+
+def test_without_a_catalog_the_chains_wait_for_a_description():
+    configuration = Configuration.checked(None, chains=['l_sole'], version='urdf')
+    assert (configuration.chains, configuration.awaited) == ((), ('l_sole',))
+    for values, refused in (({'version': 'v3'}, "version: found 'v3', allowed with descr"),
+                            ({'chains': []}, 'chains: no chain is named'),
+                            ({'stamp_source': 'later'}, 'stamp_source')):
+        with pytest.raises(ParameterError, match=refused):
+            Configuration.checked(None, **values)
 
 
 def test_a_chain_without_a_default_version_needs_one(arms):

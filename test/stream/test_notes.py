@@ -101,15 +101,30 @@ def test_a_loop_is_told_from_publishers_that_contradict_each_other(robot):
         'publishers bring the same joints?']
 
 
-@pytest.mark.parametrize(('name', 'is_near'), [
-    ('L_KNEE', True), ('icub/l_knee', True), ('icub::l_knee', True), ('l_knee_joint', True),
-    ('ICUB_L_KNEE', True), ('r_knee', False), ('special_knee', False), ('l_kneecap', False)])
-def test_names_that_match_nothing_with_those_that_are_near(robot, name, is_near):
-    hint = f"; '{name}' is nearly 'l_knee', but names must be equal" if is_near else ''
+NEAR = "; '{}' is nearly 'l_knee', but names must be equal"
+PREFIX = "; '{}' is looked for with joint_prefix:={}"
+
+
+@pytest.mark.parametrize(('name', 'hint'), [
+    ('L_KNEE', NEAR), ('l_knee_joint', NEAR), ('ICUB_L_KNEE', NEAR), ('icub/l_knee_1', NEAR),
+    ('icub/l_knee', PREFIX.format('icub/l_knee', 'icub/')),
+    ('icub::l_knee', PREFIX.format('icub::l_knee', 'icub::')),
+    ('r_knee', ''), ('special_knee', ''), ('l_kneecap', '')])
+def test_names_that_match_nothing_with_those_that_are_near(robot, name, hint):
     robot.send(0, ('wheel', name, *RIGHT[4:]))
     assert lines(robot)[0] == (
         f'left_leg: no message on /joint_states has one of its joints ({", ".join(LEFT)}); names '
-        f'that came: wheel, {name}, r_ankle_pitch, r_ankle_roll{hint}')
+        f'that came: wheel, {name}, r_ankle_pitch, r_ankle_roll{hint.format(name)}')
+
+
+@pytest.mark.parametrize(('name', 'prefix'), [('icub1/l_knee', 'icub1/'), ('l_knee', '""')])
+def test_names_under_another_prefix(name, prefix):
+    robot = LegInput(velocities=False, joint_prefix='icub2/')
+    robot.send(0, [name])
+    [left, right] = [note.text for note in notes_of(robot.take_look(), joint_prefix='icub2/')]
+    assert 'has one of its joints (icub2/l_hip_pitch, icub2/l_hip_roll' in left
+    assert left.endswith(PREFIX.format(name, prefix))
+    assert right.endswith(f'names that came: {name}')
 
 
 def test_many_long_names_fit_a_line(robot):

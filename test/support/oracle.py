@@ -37,12 +37,19 @@ HEAD_V2: list[Row] = [
     (32, 0, pi / 2, 0), (0, -5.5, pi / 2, -90), (0, -223.3, -pi / 2, -90),
     (9.5, 0, pi / 2, 90), (0, 0, -pi / 2, -90), (18.5, 110.8, -pi / 2, 90)]
 
+# Of the URDF of iCubGenova09, read off by the documented method; not in print.
+HEAD_V3: list[Row] = [
+    (72.5, 0, -pi / 2, -90), (0, 0, -pi / 2, 90), (4.86151, -278.7695, -pi / 2, 0),
+    (9.5005, 0, pi / 2, 90), (0, 0, pi / 2, 90), (-5.5, 170.484, pi, 0)]
+
 
 def _leg_root(x: float, y: float, z: float) -> np.ndarray:
     return np.array([[1, 0, 0, x / 1000], [0, 0, 1, y / 1000], [0, -1, 0, z / 1000], [0, 0, 0, 1]])
 
 
 HEAD_ROOT = np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
+HEAD_V3_ROOT = np.array([[0.0, 0, -1, 0], [1, 0, 0, 0], [0, -1, 0, 0.0605], [0, 0, 0, 1]])
+T_NIS_V3 = np.array([[1.0, 0, 0, 0], [0, 1, 0, -0.0035], [0, 0, 1, 0], [0, 0, 0, 1]])
 T_NIS = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0.0066], [0, 0, 0, 1]])
 V3_ROOT = {side: np.array([[-1, 0, 0, 0.0216], [0, 0, -1, y], [0, -1, 0, 0], [0, 0, 0, 1]])
            for side, y in (('left', 0.07365), ('right', -0.07365))}
@@ -57,6 +64,7 @@ TABLES: dict[tuple[str, str], tuple[np.ndarray, list[Row], np.ndarray]] = {
     ('right_leg', 'v2_5'): (_leg_root(0, 68.1, -119.9), RIGHT_V2_5, np.eye(4)),
     ('right_leg', 'v3'): (V3_ROOT['right'], RIGHT_V3, np.eye(4)),
     ('head_imu', 'v2'): (HEAD_ROOT, HEAD_V2, T_NIS),
+    ('head_imu', 'v3'): (HEAD_V3_ROOT, HEAD_V3, T_NIS_V3),
 }
 V3_SOLE = SOLE @ np.array([[1, 0, 0, 0.02288], [0, 1, 0, 0], [0, 0, 1, -0.0126], [0, 0, 0, 1]])
 
