@@ -25,8 +25,8 @@ _FORMATS = {
     'stale_joint': '{:.3f} s old',
     'non_finite': '{}',
     'no_velocity': '{}',
-    'out_of_range': '{:.6g}',
     'looks_like_degrees': '{:.6g}',
+    'out_of_range': '{:.6g}',
 }
 """How what was found of a joint is written, by reason."""
 
@@ -109,8 +109,8 @@ def _of_messages(look: Look, on_topic: str) -> Iterator[tuple[str, str]]:
 
 def _of_chain(look: ChainLook) -> Iterator[tuple[str, str]]:
     """Yield keys and texts of what there is to say of a chain's joints."""
-    for reason, joints in look.joints.items():
-        words = listed(reason, joints)
+    for reason in [reason for reason in _FORMATS if reason in look.joints]:
+        words = listed(reason, look.joints[reason])
         messages = _messages(look.held_back[reason])
         if reason == 'out_of_range':
             yield reason, f'out of range: {words}'
