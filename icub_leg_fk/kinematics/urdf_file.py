@@ -256,8 +256,17 @@ class Urdf:
             passed.add(link)
         return way
 
+    @cached_property
+    def _joints_read(self) -> dict[str, UrdfJoint]:
+        return {}
+
     def _checked(self, joint: JointElement) -> UrdfJoint:
-        """Return a joint of the way with its numbers read."""
+        """Return a joint of the way with its numbers, which are read once."""
+        if joint.name not in self._joints_read:
+            self._joints_read[joint.name] = self._read_joint(joint)
+        return self._joints_read[joint.name]
+
+    def _read_joint(self, joint: JointElement) -> UrdfJoint:
         if joint.kind not in (*MOVING, 'fixed'):
             self._fail(f'joint {joint.name!r} is {joint.kind or "of no type"}; allowed: revolute, '
                        'continuous, prismatic, fixed')
