@@ -20,19 +20,23 @@ from typing import Any, NamedTuple
 from bench.joint_messages import joint_positions, ROBOT_JOINTS
 from bench.report import cpu_ns, ratio, Report
 from geometry_msgs.msg import PoseStamped, TwistStamped
+from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.stream.configuration import LEGS
 from icub_leg_fk.tools.replay import (
     DemoError,
     lossless,
     running_node,
     stay_on_this_machine,
 )
+from icub_leg_fk.tools.urdf_text import urdf_text
 import rclpy
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 
 FEET = ('left_foot', 'right_foot')
 _OURS, _REFERENCES = 'icub_leg_fk.node.main', 'bench.reference_nodes'
@@ -42,11 +46,13 @@ class _Kind(NamedTuple):
     program: tuple[str, ...]
     publish_twist: bool = False
     reliable: bool = True  # whether its subscribers are
+    described: bool = False  # whether it computes with a description of the robot
 
 
 _NODES = {
     'floor': _Kind((_REFERENCES, 'floor')),
     'here': _Kind((_OURS,)),
+    'here, with a description': _Kind((_OURS,), described=True),
     'plain': _Kind((_REFERENCES, 'plain')),
     'here, with two twists': _Kind((_OURS,), publish_twist=True),
     'here, best-effort subscribers': _Kind((_OURS,), reliable=False),
@@ -102,6 +108,8 @@ def _report_cpu(report: Report, stretches: dict[str, list[_Stretch]]) -> None:
         if lost:
             report.note(f'  {name}: {lost} of its messages were lost, expect odd figures')
     report.row('CPU, here / floor', ratio(cpu['here'], cpu['floor']), 'x', at_most=1.25)
+    report.row('CPU, with a description / without',
+               ratio(cpu['here, with a description'], cpu['here']), 'x', at_most=1.03)
     report.row('CPU, here / plain', ratio(cpu['here'], cpu['plain']), 'x', at_most=0.32)
 
 
@@ -127,6 +135,7 @@ def _start(stack: ExitStack, load: _Load, namespace: str, kind: _Kind) -> _Node:
     if kind.program == (_OURS,):
         parameters = lossless(namespace, FEET, _DEPTH)
         parameters['publish_twist'] = str(kind.publish_twist).lower()
+        parameters['description_from_topic'] = str(kind.described).lower()
     # In sessions of their own Linux would share out the cores among the nodes differently.
     process, check = stack.enter_context(
         running_node(namespace, parameters, kind.program, own_session=False))
@@ -153,11 +162,19 @@ class _Load:
 
     def watch(self, namespace: str, kind: _Kind) -> list[list[int]]:
         """Subscribe to the poses, and twists, of a node; return where their arrivals go."""
+        if kind.described:
+            self._describe(namespace)
         arrivals = [self._watch(namespace, PoseStamped, f'{foot}/pose', kind) for foot in FEET]
         if kind.publish_twist:
             arrivals += [self._watch(namespace, TwistStamped, f'{foot}/twist', kind)
                          for foot in FEET]
         return arrivals
+
+    def _describe(self, namespace: str) -> None:
+        """Send a description of the robot, as robot_state_publisher does."""
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        publisher = self._node.create_publisher(String, f'{namespace}/robot_description', latched)
+        publisher.publish(String(data=urdf_text('icub', Catalog.load().select(LEGS))))
 
     def _watch(self, namespace: str, message: Any, topic: str, kind: _Kind) -> list[int]:
         arrived: list[int] = []

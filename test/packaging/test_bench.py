@@ -22,7 +22,8 @@ def bench(*arguments):
     ('start', ['leg_fk pose / imports']),
     ('kinematics', ['one pose / Pinocchio', 'many poses, loop over Pinocchio / here']),
     ('bag', ['bag, plain loop / here', 'bag, peak memory', '--jobs 1 / --jobs 2']),
-    ('node', ['CPU, here / floor', 'CPU, here / plain', 'p50, here / floor'])])
+    ('node', ['CPU, here / floor', 'CPU, with a description / without', 'CPU, here / plain',
+              'p50, here / floor'])])
 def test_each_part_is_measured_and_its_promises_are_told_in_the_last_line(part, promises):
     for library in {'kinematics': ['pinocchio'], 'bag': ['rosbags'], 'node': ['rclpy']}.get(
             part, []):

@@ -1,5 +1,7 @@
 """What a set of values gives, or why it is refused; the node and `leg_fk bag` take the same."""
 
+import re
+
 from icub_leg_fk.errors import ParameterError
 from icub_leg_fk.kinematics import Catalog, Urdf
 from icub_leg_fk.stream.configuration import Configuration
@@ -125,8 +127,9 @@ def test_joints_are_looked_for_under_their_prefix(shipped, tmp_path):
     assert leg.joint_names == tuple(f'icub 1/{name}' for name in bare.joint_names)
     assert leg.pose([0.1] * 6) == bare.pose([0.1] * 6)
     file = tmp_path / 'led.yaml'
-    row = '{type: prismatic, a: 0, d: 0.1, alpha: 0, joint: lift'
-    file.write_text(ARMS.replace('{type: prismatic, a: 0, d: 0.1, alpha: 0', f'{row}}}, {row}'))
+    rows = ('[{type: prismatic, a: 0, d: 0.1, alpha: 0, joint: lift}, '
+            '{type: prismatic, a: 0, d: 0, alpha: 0, joint: lift, gain: 2}]')
+    file.write_text(re.sub(r'links: \[.*\]}', f'links: {rows}}}', ARMS))
     arm, = Configuration.checked(Catalog.load(file), chains=['arm=a'], joint_prefix='x').chains
     assert [row.joint for row in arm.rows()] == ['xlift', 'xlift']
 
