@@ -182,7 +182,7 @@ class Urdf:
         if guess is None:
             guess = next((name for name in self.links if link.casefold() in name.casefold()), None)
         advice = f'did you mean {guess!r}?' if guess and guess not in ends else ''
-        raise UnknownNameError(f'link of {self.file}', link, ends, advice)
+        raise UnknownNameError('link', link, ends, advice, of=self.file)
 
     def path(self, root: str, tip: str) -> tuple[UrdfJoint, ...]:
         """Return the joints from one link to another.

@@ -39,7 +39,7 @@ ANSWERS = [
     (f'pose left_arm --degrees {ZEROS}', 2, "'left_arm'; known: left_leg, right_leg, head_imu"),
     (f'pose Left_Leg --degrees {ZEROS}', 2, "did you mean 'left_leg'?"),
     (f'pose left_foot --degrees {ZEROS}', 2, 'left_foot is the tip of left_leg'),
-    (f'pose r_sole --degrees {ZEROS}', 2, 'r_sole is right_leg with --foot-frame sole'),
+    (f'pose r_sole --degrees {ZEROS}', 2, 'r_sole is the sole frame of right_leg'),
     (f'pose left_leg --version V2_5 --degrees {ZEROS}', 2,
      "'V2_5'; did you mean 'v2_5'? known: v1, v2_5, v3"),
     (f'pose left_leg=v9 --degrees {ZEROS}', 2, 'known: v1, v2_5, v3'),

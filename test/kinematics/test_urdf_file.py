@@ -294,7 +294,7 @@ def test_an_unknown_link_lists_the_links_at_the_ends() -> None:
     with pytest.raises(UnknownNameError) as error:
         chain_from_urdf(urdf, 'l0', 'elbow')
     assert str(error.value) == (
-        "unknown link of robot.urdf 'elbow'; known: l2; did you mean 'the_elbow'?")
+        "unknown link 'elbow' of robot.urdf; known: l2; did you mean 'the_elbow'?")
     with pytest.raises(UnknownNameError, match="did you mean 'l2'"):
         chain_from_urdf(urdf, 'l0', 'l22')
 
