@@ -42,6 +42,7 @@ examples:
   leg_fk explain left_leg
   leg_fk bag walking.mcap walking_with_poses.mcap
   leg_fk plot walking.mcap -o feet.png
+  leg_fk view
   leg_fk table my_robot.urdf --root root_link --tips l_sole r_sole -o my_robot.yaml
   leg_fk compare my_robot.urdf
   leg_fk urdf left_leg right_leg -o legs.urdf

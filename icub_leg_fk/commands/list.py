@@ -23,6 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the chains."""
     catalog = options.load_catalog(args)
+    options.refuse_no_chains(catalog)
     entries = catalog.chains.values()
     if args.json:
         chains = [_as_json(entry) for entry in entries]

@@ -8,7 +8,7 @@ from pathlib import Path
 import sys
 import tempfile
 
-from icub_leg_fk.errors import CatalogError, LegFKError
+from icub_leg_fk.errors import CatalogError, InputFileError, LegFKError
 from icub_leg_fk.kinematics import Catalog, Chain, Urdf
 from icub_leg_fk.kinematics.difference import difference, postures
 from icub_leg_fk.kinematics.table_from_urdf import almost_parallel, as_modified, TIDY
@@ -77,8 +77,9 @@ def run(args: argparse.Namespace) -> int:
 def _chains(catalog: Catalog, args: argparse.Namespace) -> list[Chain]:
     tips = args.tips or catalog.known()
     if not tips:
-        raise LegFKError(f'{args.urdf}: is no robot whose chains have names here; give --tips, '
-                         f'such as {", ".join(catalog.chains) or "none"}')
+        options.refuse_no_chains(catalog)
+        raise InputFileError(args.urdf, "has none of the iCub's chains; give --tips, such as "
+                             f'{" ".join(catalog.chains)}')
     chains = []
     for name, tip in zip(_names(args.name, tips), tips, strict=True):
         chain = replace(catalog.chain(tip), name=name)
@@ -111,8 +112,8 @@ def _read_back(text: str, urdf_file: str) -> Catalog:
         try:
             return Catalog.load(file)
         except CatalogError as error:
-            raise LegFKError(f'{urdf_file}: cannot be written as a kinematics file: '
-                             f'{error.fault}') from error
+            raise InputFileError(urdf_file, 'cannot be written as a kinematics file: '
+                                 f'{error.fault}') from error
 
 
 def _report(chain: Chain, urdf: Urdf, tolerance: float) -> list[str]:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from icub_leg_fk.errors import InputFileError, LegFKError, UnknownNameError
+from icub_leg_fk.errors import LegFKError, UnknownNameError
 from icub_leg_fk.kinematics import Catalog, Chain
 from icub_leg_fk.tools import options
 from icub_leg_fk.tools.output_file import write_text
@@ -54,8 +54,7 @@ def _chosen_chains(catalog: Catalog, args: argparse.Namespace) -> tuple[Chain, .
     """Return the chains asked for; if none is, all that have the version asked for."""
     if args.chains:
         return catalog.select(args.chains, args.version)
-    if not catalog.chains:
-        raise InputFileError(catalog.file, 'has no chain')
+    options.refuse_no_chains(catalog)
     first = next(iter(catalog.chains))
     version = args.version or catalog.chain(first).version
     names = [name for name, entry in catalog.chains.items() if version in entry.versions]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8, BOM_UTF16_LE
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +18,7 @@ from icub_leg_fk.errors import (
 )
 from icub_leg_fk.kinematics.chain import Chain
 from icub_leg_fk.kinematics.frozen import Frozen
+from icub_leg_fk.kinematics.input_bytes import first_bytes
 from icub_leg_fk.kinematics.kinematics_file import ChainEntry, listed, read_kinematics_file
 from icub_leg_fk.kinematics.urdf_chains import doubts, UrdfChains
 from icub_leg_fk.kinematics.urdf_file import Urdf
@@ -24,6 +26,8 @@ from icub_leg_fk.kinematics.yaml_fields import MAX_BYTES
 
 PACKAGE = 'icub_leg_fk'
 SHIPPED_FILE = 'icub_kinematics.yaml'
+
+_BEFORE_TEXT = b' \t\r\n\0' + BOM_UTF8 + BOM_UTF16_LE
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -238,13 +242,9 @@ def _refuse_shared_tips(chains: Iterable[Chain]) -> None:
 
 def _holds_xml(path: str | Path) -> bool:
     """Return whether a file is a URDF, or at least is meant to be one."""
-    try:
-        with open(path, 'rb') as stream:
-            start = stream.read(MAX_BYTES)
-    except (OSError, ValueError):
-        return False  # reading it will say why
+    start = first_bytes(path, MAX_BYTES)
     robot, chains = start.find(b'<robot'), start.find(b'chains:')
-    if start.lstrip().startswith((b'<', b'data:')):
+    if start.lstrip(_BEFORE_TEXT).startswith((b'<', b'data:')):
         return True
     return robot >= 0 and not 0 <= chains < robot
 

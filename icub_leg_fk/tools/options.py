@@ -6,7 +6,7 @@ import math
 import sys
 from typing import Any
 
-from icub_leg_fk.errors import JointVectorError, LegFKError
+from icub_leg_fk.errors import InputFileError, JointVectorError, LegFKError
 from icub_leg_fk.kinematics import Catalog, Chain, ChainEntry
 from icub_leg_fk.stream.configuration import LEGS
 
@@ -71,6 +71,12 @@ def load_catalog(args: argparse.Namespace) -> Catalog:
     for line in catalog.warnings:
         print(f'leg_fk: warning: {line}', file=sys.stderr)
     return catalog
+
+
+def refuse_no_chains(catalog: Catalog) -> None:
+    """Refuse a URDF without chains."""
+    if not catalog.chains:
+        raise InputFileError(catalog.file, 'has no chain: no joint moves a link at its ends')
 
 
 def load_chain(args: argparse.Namespace) -> tuple[Catalog, Chain]:

@@ -272,7 +272,7 @@ def test_a_chain_that_cannot_be_is_refused(mistake: Any) -> None:
 
 
 def test_a_row_of_an_unknown_joint_is_refused() -> None:
-    with pytest.raises(UnknownNameError, match="unknown joint of chain any 'knee'; known: hip"):
+    with pytest.raises(UnknownNameError, match="unknown joint 'knee' of chain any; known: hip"):
         chain_of([DHLink(0, 0, 0, joint='knee')], joint_names=['hip'])
 
 
@@ -309,7 +309,7 @@ def test_a_chain_in_another_frame_of_its_tip() -> None:
     assert (LEG.frame, LEG.frame_id) == ('dh', 'l_foot_dh_frame')
     assert (sole.frame, sole.frame_id) == ('sole', 'l_sole')
     assert sole.with_frame('dh') == LEG and LEG.with_frame('dh') is LEG
-    with pytest.raises(UnknownNameError, match="left_leg 'toe'; known: dh, sole"):
+    with pytest.raises(UnknownNameError, match="'toe' of chain left_leg; known: dh, sole"):
         LEG.with_frame('toe')
 
 
