@@ -74,7 +74,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('urdf', metavar='ROBOT.urdf', help='the URDF of the robot')
     parser.add_argument('--chains', metavar='CHAIN', nargs='+',
                         help='chains to compare (default: all whose joints the robot has)')
-    options.add(parser, '--kinematics-file', '--json')
+    options.add(parser, '--kinematics-file', '--root', '--json')
 
 
 def run(args: argparse.Namespace) -> int:

@@ -17,7 +17,7 @@ _JOINTS_IN_A_LINE = 6
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    options.add(parser, '--kinematics-file', '--json')
+    options.add(parser, '--kinematics-file', '--root', '--json')
 
 
 def run(args: argparse.Namespace) -> int:

@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add(parser, 'chains')
     parser.add_argument('--name', metavar='NAME',
                         help='name of the robot (default: icub, or that of your file)')
-    options.add(parser, '--version', '--kinematics-file')
+    options.add(parser, '--version', '--kinematics-file', '--root')
     options.add_output(parser, 'file to write (default: standard output)')
 
 

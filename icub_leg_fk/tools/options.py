@@ -63,11 +63,11 @@ def number_between(low: float, high: float, allowed: str = '') -> Callable[[str]
 
 def load_catalog(args: argparse.Namespace) -> Catalog:
     """Return the catalog that `-k` names, with a line on stderr for each of its warnings."""
-    for option in ('kinematics_file', 'version', 'foot_frame'):
+    for option in ('kinematics_file', 'root', 'version', 'foot_frame'):
         if getattr(args, option, None) == '':  # as an unset variable of the shell leaves it
             words = option.replace('_', '-')
             raise LegFKError(f'--{words} is empty; leave it out for its default')
-    catalog = Catalog.load(args.kinematics_file)
+    catalog = Catalog.load(args.kinematics_file, root=getattr(args, 'root', None))
     for line in catalog.warnings:
         print(f'leg_fk: warning: {line}', file=sys.stderr)
     return catalog
@@ -212,8 +212,12 @@ _OPTIONS: dict[str, dict[str, Any]] = {
         'help': 'print JSON, for programs'},
     '--kinematics-file': {
         'metavar': 'FILE',
-        'help': "a kinematics file, with the DH tables of any robot (default: the iCub's, as "
-                'shipped)'},
+        'help': "a kinematics file, with the DH tables of any robot, or a URDF (default: the "
+                "iCub's tables, as shipped)"},
+    '--root': {
+        'metavar': 'LINK',
+        'help': 'of a URDF, the link that poses are given in (default: root_link, or the top of '
+                'the tree)'},
     '--force': {
         'action': 'store_true',
         'help': 'replace what exists already'},
