@@ -57,6 +57,8 @@ _NOBODY_READS = 128 + 13  # as it reports SIGPIPE
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; return 0, or 2 after a mistake, which is one line on stderr."""
     words = sys.argv[1:] if argv is None else list(argv)
+    if sys.stderr is None:  # it is closed, and print would take standard output
+        sys.stderr = open(os.devnull, 'w', encoding='utf-8')
     if '_ARGCOMPLETE' in os.environ:
         _complete(os.environ['COMP_LINE'])
     if isinstance(sys.stdout, io.TextIOWrapper):

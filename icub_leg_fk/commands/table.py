@@ -14,7 +14,7 @@ from icub_leg_fk.kinematics.difference import difference, postures
 from icub_leg_fk.kinematics.table_from_urdf import almost_parallel, as_modified, TIDY
 from icub_leg_fk.tools import options
 from icub_leg_fk.tools.kinematics_file_text import kinematics_file_text, one_line
-from icub_leg_fk.tools.output_file import check_target, write_text
+from icub_leg_fk.tools.output_file import check_target, STANDARD_OUTPUT, write_text
 
 EXAMPLES = """\
 Carries out the documented method on a URDF: z axes, origins, x axes, y axes, DH parameters,
@@ -35,8 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument('urdf', metavar='ROBOT.urdf', help='the URDF; of a xacro file make one '
                         'first: xacro FILE > robot.urdf')
-    parser.add_argument('--root', metavar='LINK', help='link to start from (default: root_link, '
-                        'or the top of the tree)')
+    options.add(parser, '--root')
     parser.add_argument('--tips', metavar='LINK', nargs='+',
                         help="links to write a chain for (default: the iCub's legs and head, as "
                              'far as the robot has them)')
@@ -54,7 +53,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the kinematics file."""
-    if args.output is not None:
+    is_printed = args.output in (None, STANDARD_OUTPUT)
+    if not is_printed:
         check_target(args.output, force=args.force)
     urdf = Urdf.load(args.urdf)
     catalog = Catalog.from_urdf(urdf, root=args.root, tolerance=args.tolerance)
@@ -67,10 +67,10 @@ def run(args: argparse.Namespace) -> int:
     for chain in chains:
         lines += _report(written.chain(chain.name), urdf, args.tolerance)
     write_text(args.output, text, force=args.force)
-    if args.output is not None:
+    if not is_printed:
         names = ', '.join(chain.name for chain in chains)
         lines.insert(0, f'{args.output}: {names}')
-    print('\n'.join(lines), file=sys.stderr if args.output is None else sys.stdout)
+    print('\n'.join(lines), file=sys.stderr if is_printed else sys.stdout)
     return 0
 
 

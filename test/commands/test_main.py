@@ -84,6 +84,12 @@ ANSWERS = [
     ('urdf left_leg -o -x.urdf', 2, 'unknown option -x.urdf'),
     ('urdf left_leg -o /dev/null', 2, '/dev/null'),
     ('urdf left_leg -o /no/such/folder/x.urdf', 2, 'there is no directory'),
+    ('urdf left_leg -o /proc/x.urdf', 2, '/proc/x.urdf: cannot be written: no such file'),
+    ('urdf left_leg -o ""', 2, "'': is not the name of a file"),
+    ('urdf left_leg -o /', 2, "'/': is not the name of a file"),
+    ('demo -o /proc/x.png', 2, '/proc/x.png: cannot be written: no such file'),
+    ('demo -o ""', 2, 'is not the name of a file'),
+    ('demo --save /proc/x', 2, '/proc/x: cannot be written: no such file'),
 ]
 
 # Files that are not what is asked for.
@@ -113,6 +119,10 @@ ANSWERS_ON_FILES = [
     ('list -k utf16.urdf', 'is UTF-16 text; allowed: UTF-8'),
     ('list -k arm.xacro', 'xacro arm.xacro > robot.urdf'),
     ('urdf -k link.urdf', 'has no chain'),
+    ('list -k arm.urdf --root l9', "unknown link 'l9' of arm.urdf; "),
+    ('list -k arm.urdf --root ""', '--root is empty; leave it out for its default'),
+    ('pose l2 -k arm.urdf --root l1 --degrees 0 0', '2 entries; allowed: 1, in the order j1'),
+    ('explain l1 -k arm.urdf --root l1', "no joint moves between 'l1' and 'l1'"),
     ('pose left_leg -k arm.urdf --degrees 0', "unknown chain 'left_leg'; known: l2"),
     ('table empty', 'is empty'),
     ('table ""', "cannot read '': no such file"),
@@ -258,7 +268,7 @@ def test_a_full_disk_is_reported_in_one_line():
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_the_command_quietly(monkeypatch, number):
-    monkeypatch.setattr(Catalog, 'load', lambda path: signal.raise_signal(number))
+    monkeypatch.setattr(Catalog, 'load', lambda *_, **__: signal.raise_signal(number))
     done = run_main('list')
     assert (done.returncode, done.stdout, done.stderr) == (128 + number, '', '')
 
@@ -266,7 +276,7 @@ def test_a_signal_ends_the_command_quietly(monkeypatch, number):
 def test_a_signal_that_is_ignored_as_by_nohup_stays_so(monkeypatch):
     shipped = Catalog.load()
 
-    def load(path):
+    def load(*_, **__):
         signal.raise_signal(signal.SIGHUP)
         return shipped
 
@@ -306,3 +316,9 @@ def test_the_shell_is_offered_what_fits(line, offered, tmp_path):
                         '_ARGCOMPLETE_IFS': '\n', '_ARGCOMPLETE_STDOUT_FILENAME': str(answer),
                         '_ARGCOMPLETE_COMP_WORDBREAKS': '='})
     assert {word.strip() for word in answer.read_text().splitlines()} == offered
+
+
+def test_a_closed_stderr_leaves_standard_output_alone(monkeypatch, capsys):
+    monkeypatch.setattr(sys, 'stderr', None)
+    assert main(['lsit']) == 2
+    assert capsys.readouterr().out == ''
