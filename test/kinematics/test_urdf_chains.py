@@ -134,6 +134,10 @@ def test_degrees_in_a_urdf_are_computed_and_reported(tmp_path: Path) -> None:
     assert limits == f'{file}: joint j0: a limit of -180 and 180 is unlikely; it is in rad'
     with pytest.warns(UserWarning, match='is unlikely'):
         load_chain('l2', file=file)
+    file.write_text(robot([joint(i, xyz='0 0 300') for i in range(3)]))
+    assert Catalog.load(file).warnings == (
+        f'{file}: joint j0: an xyz of 0 0 300 is unlikely; it is in m (and 2 more joints like '
+        'this)',)
 
 
 @needs_robots
