@@ -42,6 +42,7 @@ examples:
   leg_fk explain left_leg
   leg_fk bag walking.mcap walking_with_poses.mcap
   leg_fk plot walking.mcap -o feet.png
+  leg_fk view
   leg_fk table my_robot.urdf --root root_link --tips l_sole r_sole -o my_robot.yaml
   leg_fk compare my_robot.urdf
   leg_fk urdf left_leg right_leg -o legs.urdf
@@ -56,6 +57,8 @@ _NOBODY_READS = 128 + 13  # as it reports SIGPIPE
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; return 0, or 2 after a mistake, which is one line on stderr."""
     words = sys.argv[1:] if argv is None else list(argv)
+    if sys.stderr is None:  # it is closed, and print would take standard output
+        sys.stderr = open(os.devnull, 'w', encoding='utf-8')
     if '_ARGCOMPLETE' in os.environ:
         _complete(os.environ['COMP_LINE'])
     if isinstance(sys.stdout, io.TextIOWrapper):

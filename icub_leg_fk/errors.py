@@ -19,25 +19,29 @@ class UnknownNameError(LegFKError):
     """A name that is not among the known ones.
 
     Attributes:
-        kind: what the name was meant for, such as `chain` or `version of chain left_leg`.
+        kind: what the name was meant for, such as `chain` or `version`.
         name: the name that was given.
         choices: the names that exist.
         advice: what else may help; empty if nothing.
+        of: what should have the name, such as `chain left_leg`; empty if that is clear.
     """
 
-    def __init__(self, kind: str, name: str, choices: Iterable[str], advice: str = '') -> None:
+    def __init__(self, kind: str, name: str, choices: Iterable[str], advice: str = '',
+                 of: str = '') -> None:
         self.kind = kind
         self.name = name
         self.choices = tuple(choices)
         self.advice = advice
-        super().__init__(kind, name, self.choices, advice)
+        self.of = of
+        super().__init__(kind, name, self.choices, advice, of)
 
     def __str__(self) -> str:
         guess = closest(self.name, self.choices) if isinstance(self.name, str) else None
         hint = f'did you mean {guess!r}? ' if guess else ''
         known = ', '.join(self.choices) or 'none'
         advice = f'; {self.advice}' if self.advice else ''
-        return f'unknown {self.kind} {reprlib.repr(self.name)}; {hint}known: {known}{advice}'
+        of = f' of {self.of}' if self.of else ''
+        return f'unknown {self.kind} {reprlib.repr(self.name)}{of}; {hint}known: {known}{advice}'
 
 
 class VersionNeededError(LegFKError):

@@ -74,24 +74,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('urdf', metavar='ROBOT.urdf', help='the URDF of the robot')
     parser.add_argument('--chains', metavar='CHAIN', nargs='+',
                         help='chains to compare (default: all whose joints the robot has)')
-    options.add(parser, '--kinematics-file', '--json')
+    options.add(parser, '--kinematics-file', '--root', '--json')
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the comparison."""
     catalog, urdf = options.load_catalog(args), Urdf.load(args.urdf)
     found: list[Comparison] = []
-    not_compared = []
+    not_compared: dict[str, str] = {}
     for name in args.chains or catalog.chains:
         rows, reason = _compare_chain(catalog, name, urdf)
         found += rows
         if not rows:
-            not_compared.append(f'{name}: not compared: {reason}')
+            not_compared[name] = reason
     if not found:
-        raise InputFileError(args.urdf, f'cannot be compared: {"; ".join(not_compared)}')
+        reasons = '; '.join(f'{name}: {reason}' for name, reason in not_compared.items())
+        raise InputFileError(args.urdf, f'cannot be compared: {reasons}; -k takes tables with the '
+                             'names of this robot')
     nearest = _nearest_of_each_chain(found)
     advice = [_summary(row, found) for row in nearest]
-    advice += [*not_compared, *_what_to_run(nearest, urdf, args)]
+    advice += [f'{name}: not compared: {reason}' for name, reason in not_compared.items()]
+    advice += _what_to_run(nearest, urdf, args)
     if args.json:
         differences = [_as_json(row, row in nearest) for row in found]
         print(text.as_json({'urdf': args.urdf, 'robot': urdf.name, 'advice': advice,
@@ -112,7 +115,7 @@ def _compare_chain(catalog: Catalog, name: str, urdf: Urdf) -> tuple[list[Compar
     """Return the comparisons of a chain's versions, and why there is none if there is none."""
     rows: list[Comparison] = []
     reasons: list[str] = []
-    for table in catalog.entry(name).versions.values():
+    for table in _versions(catalog, name):
         frames = []
         for frame in table.tip_frames:
             reason = _lacks(urdf, table.with_frame(frame))
@@ -121,6 +124,14 @@ def _compare_chain(catalog: Catalog, name: str, urdf: Urdf) -> tuple[list[Compar
                 frames.append(frame)
         rows += compared(table, frames, urdf)
     return rows, reasons[0]
+
+
+def _versions(catalog: Catalog, name: str) -> list[Chain]:
+    """Return a chain in all its versions, or in the one that is named with it."""
+    chain, version = catalog.split(name)
+    if version:
+        return [catalog.chain(name)]
+    return list(catalog.entry(chain).versions.values())
 
 
 def compared(table: Chain, frames: Sequence[str], urdf: Urdf) -> list[Comparison]:

@@ -60,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Give the demonstration; return 1 if a pose is missing or the node failed."""
-    picture = Path(args.output or _DEFAULT_PICTURE)
+    picture = _DEFAULT_PICTURE if args.output is None else args.output
     may_replace = args.force or args.output is None
     check_output(picture, may_replace)
     if args.save:

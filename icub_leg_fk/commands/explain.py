@@ -21,7 +21,7 @@ examples:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    options.add(parser, 'chain', '--version', '--foot-frame', '--kinematics-file')
+    options.add(parser, 'chain', '--version', '--foot-frame', '--kinematics-file', '--root')
     options.add_joint_positions(parser, required=False)
     parser.add_argument('--symbolic', action='store_true',
                         help='exact numbers instead of decimals: pi/2, not 1.5708 (by sympy)')

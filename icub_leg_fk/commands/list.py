@@ -17,12 +17,13 @@ _JOINTS_IN_A_LINE = 6
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    options.add(parser, '--kinematics-file', '--json')
+    options.add(parser, '--kinematics-file', '--root', '--json')
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the chains."""
     catalog = options.load_catalog(args)
+    options.refuse_no_chains(catalog)
     entries = catalog.chains.values()
     if args.json:
         chains = [_as_json(entry) for entry in entries]

@@ -22,7 +22,8 @@ _DECIMALS = 7
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    options.add(parser, 'chain', '--version', '--foot-frame', '--kinematics-file', '--json')
+    options.add(parser, 'chain', '--version', '--foot-frame',
+                '--kinematics-file', '--root', '--json')
     options.add_joint_positions(parser, required=True)
 
 

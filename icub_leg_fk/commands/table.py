@@ -8,13 +8,13 @@ from pathlib import Path
 import sys
 import tempfile
 
-from icub_leg_fk.errors import CatalogError, LegFKError
+from icub_leg_fk.errors import CatalogError, InputFileError, LegFKError
 from icub_leg_fk.kinematics import Catalog, Chain, Urdf
 from icub_leg_fk.kinematics.difference import difference, postures
 from icub_leg_fk.kinematics.table_from_urdf import almost_parallel, as_modified, TIDY
 from icub_leg_fk.tools import options
 from icub_leg_fk.tools.kinematics_file_text import kinematics_file_text, one_line
-from icub_leg_fk.tools.output_file import check_target, write_text
+from icub_leg_fk.tools.output_file import check_target, STANDARD_OUTPUT, write_text
 
 EXAMPLES = """\
 Carries out the documented method on a URDF: z axes, origins, x axes, y axes, DH parameters,
@@ -35,8 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument('urdf', metavar='ROBOT.urdf', help='the URDF; of a xacro file make one '
                         'first: xacro FILE > robot.urdf')
-    parser.add_argument('--root', metavar='LINK', help='link to start from (default: root_link, '
-                        'or the top of the tree)')
+    options.add(parser, '--root')
     parser.add_argument('--tips', metavar='LINK', nargs='+',
                         help="links to write a chain for (default: the iCub's legs and head, as "
                              'far as the robot has them)')
@@ -54,7 +53,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the kinematics file."""
-    if args.output is not None:
+    is_printed = args.output in (None, STANDARD_OUTPUT)
+    if not is_printed:
         check_target(args.output, force=args.force)
     urdf = Urdf.load(args.urdf)
     catalog = Catalog.from_urdf(urdf, root=args.root, tolerance=args.tolerance)
@@ -67,18 +67,19 @@ def run(args: argparse.Namespace) -> int:
     for chain in chains:
         lines += _report(written.chain(chain.name), urdf, args.tolerance)
     write_text(args.output, text, force=args.force)
-    if args.output is not None:
+    if not is_printed:
         names = ', '.join(chain.name for chain in chains)
         lines.insert(0, f'{args.output}: {names}')
-    print('\n'.join(lines), file=sys.stderr if args.output is None else sys.stdout)
+    print('\n'.join(lines), file=sys.stderr if is_printed else sys.stdout)
     return 0
 
 
 def _chains(catalog: Catalog, args: argparse.Namespace) -> list[Chain]:
     tips = args.tips or catalog.known()
     if not tips:
-        raise LegFKError(f'{args.urdf}: is no robot whose chains have names here; give --tips, '
-                         f'such as {", ".join(catalog.chains) or "none"}')
+        options.refuse_no_chains(catalog)
+        raise InputFileError(args.urdf, "has none of the iCub's chains; give --tips, such as "
+                             f'{" ".join(catalog.chains)}')
     chains = []
     for name, tip in zip(_names(args.name, tips), tips, strict=True):
         chain = replace(catalog.chain(tip), name=name)
@@ -111,8 +112,8 @@ def _read_back(text: str, urdf_file: str) -> Catalog:
         try:
             return Catalog.load(file)
         except CatalogError as error:
-            raise LegFKError(f'{urdf_file}: cannot be written as a kinematics file: '
-                             f'{error.fault}') from error
+            raise InputFileError(urdf_file, 'cannot be written as a kinematics file: '
+                                 f'{error.fault}') from error
 
 
 def _report(chain: Chain, urdf: Urdf, tolerance: float) -> list[str]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8, BOM_UTF16_LE
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 import sys
 import sysconfig
-from typing import TypeVar
 import warnings
 
 from icub_leg_fk.errors import (
@@ -19,6 +19,7 @@ from icub_leg_fk.errors import (
 )
 from icub_leg_fk.kinematics.chain import Chain
 from icub_leg_fk.kinematics.frozen import Frozen
+from icub_leg_fk.kinematics.input_bytes import first_bytes
 from icub_leg_fk.kinematics.kinematics_file import ChainEntry, listed, read_kinematics_file
 from icub_leg_fk.kinematics.urdf_chains import doubts, UrdfChains
 from icub_leg_fk.kinematics.urdf_file import Urdf
@@ -27,7 +28,7 @@ from icub_leg_fk.kinematics.yaml_fields import MAX_BYTES
 PACKAGE = 'icub_leg_fk'
 SHIPPED_FILE = 'icub_kinematics.yaml'
 
-_Thing = TypeVar('_Thing')
+_BEFORE_TEXT = b' \t\r\n\0' + BOM_UTF8 + BOM_UTF16_LE
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -66,7 +67,7 @@ class Catalog(Frozen):
             return cls.from_urdf(Urdf.load(path), root=root, tolerance=tolerance)
         file, chains, lines = read_kinematics_file(path or config_file(SHIPPED_FILE))
         if root:
-            lines = (*lines, f'{file}: is no URDF; the root link {root!r} is not looked at')
+            lines = (*lines, f'{file}: is not a URDF; the root link {root!r} is ignored')
         return cls(file, chains, lines)
 
     @classmethod
@@ -96,9 +97,12 @@ class Catalog(Frozen):
         """Return a chain with all its versions.
 
         Raises:
-            UnknownNameError: no such chain; lists the known ones.
+            UnknownNameError: no such chain; lists the known ones, and says whose tip or frame it
+                is.
         """
-        return _named('chain', chain, self.chains)
+        if not isinstance(chain, str) or chain not in self.chains:
+            raise UnknownNameError('chain', chain, self.chains, self._owner(chain))
+        return self.chains[chain]
 
     def chain(self, name: str, version: str | None = None, frame: str | None = None) -> Chain:
         """Return one version of one chain, ready to compute with.
@@ -118,7 +122,9 @@ class Catalog(Frozen):
         chosen = own_version or version or entry.default_version
         if not chosen:
             raise VersionNeededError(chain, entry.versions)
-        found = _named(f'version of chain {chain}', chosen, entry.versions)
+        if not isinstance(chosen, str) or chosen not in entry.versions:
+            raise UnknownNameError('version', chosen, entry.versions, of=f'chain {chain}')
+        found = entry.versions[chosen]
         return found.with_frame(frame) if frame else found
 
     def select(self, names: Iterable[str], version: str | None = None) -> tuple[Chain, ...]:
@@ -131,9 +137,11 @@ class Catalog(Frozen):
         Raises:
             UnknownNameError: no such chain or version; lists the known ones.
             VersionNeededError: a chain has several versions and no default.
-            LegFKError: no chain, a chain twice, chains whose roots share a name but not axes, or
-                chains whose tips would have one topic.
+            LegFKError: no list, no chain, a chain twice, chains whose roots share a name but not
+                axes, or chains whose tips would have one topic.
         """
+        if isinstance(names, str):
+            raise LegFKError(f'chains are {names!r}; allowed: a list of names')
         chains: dict[str, Chain] = {}
         for name in names:
             chain = self._selected(name, version)
@@ -141,7 +149,8 @@ class Catalog(Frozen):
                 raise LegFKError(f'chain {chain.name} is named twice; allowed: each chain once')
             chains[chain.name] = chain
         if not chains:
-            raise LegFKError(f'no chain is named; allowed: one or more of {listed(self.chains)}')
+            known = listed(self.chains) or 'none'
+            raise LegFKError(f'no chain is named; allowed: one or more of {known}')
         _refuse_conflicting_roots(chains.values())
         _refuse_shared_tips(chains.values())
         return tuple(chains.values())
@@ -162,8 +171,20 @@ class Catalog(Frozen):
             if not is_for_all:
                 raise
             example = self.chains[name].default_version or error.choices[-1]
-            advice = f'a version of its own is given as in {name}={example}'
-            raise UnknownNameError(error.kind, error.name, error.choices, advice) from error
+            advice = f'its own version is given as in {name}={example}'
+            raise UnknownNameError(error.kind, error.name, error.choices, advice, error.of
+                                   ) from error
+
+    def _owner(self, name: str) -> str:
+        """Return whose tip or frame a name is; nothing if it is neither."""
+        for entry in map(self.entry, self.known()):
+            if name == entry.tip:
+                return f'{name} is the tip of {entry.name}'
+            for chain in entry.versions.values():
+                for frame, tip_frame in chain.tip_frames.items():
+                    if name == tip_frame.frame_id:
+                        return f'{name} is the {frame} frame of {entry.name}'
+        return ''
 
     def __repr__(self) -> str:
         return f'<Catalog {Path(self.file).name[:40]}: {listed(self.chains)}>'
@@ -229,21 +250,11 @@ def _refuse_shared_tips(chains: Iterable[Chain]) -> None:
 
 def _holds_xml(path: str | Path) -> bool:
     """Return whether a file is a URDF, or at least is meant to be one."""
-    try:
-        with open(path, 'rb') as stream:
-            start = stream.read(MAX_BYTES)
-    except (OSError, ValueError):
-        return False  # reading it will say why
+    start = first_bytes(path, MAX_BYTES)
     robot, chains = start.find(b'<robot'), start.find(b'chains:')
-    if start.lstrip().startswith((b'<', b'data:')):
+    if start.lstrip(_BEFORE_TEXT).startswith((b'<', b'data:')):
         return True
     return robot >= 0 and not 0 <= chains < robot
-
-
-def _named(kind: str, name: str, things: Mapping[str, _Thing]) -> _Thing:
-    if not isinstance(name, str) or name not in things:
-        raise UnknownNameError(kind, name, things)
-    return things[name]
 
 
 def _refuse_conflicting_roots(chains: Iterable[Chain]) -> None:

@@ -119,7 +119,7 @@ class Chain(Frozen):
         object.__setattr__(self, 'tip_frames', frames)
         object.__setattr__(self, 'frame', self.frame or next(iter(frames)))
         if self.frame not in frames:
-            raise UnknownNameError(f'tip frame of chain {self.name}', self.frame, frames)
+            raise UnknownNameError('tip frame', self.frame, frames, of=f'chain {self.name}')
         super().__post_init__()
 
     @property
@@ -340,7 +340,7 @@ class Chain(Frozen):
                 row_joints.append(-1)
             elif link.joint:
                 if link.joint not in names:
-                    raise UnknownNameError(f'joint of chain {self.name}', link.joint, names)
+                    raise UnknownNameError('joint', link.joint, names, of=f'chain {self.name}')
                 row_joints.append(names.index(link.joint))
             elif unnamed:
                 row_joints.append(unnamed.popleft())

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 JointVector = Sequence[float] | Mapping[str, float] | Array
 
+_KINDS = {'U': 'text', 'S': 'bytes', 'O': 'objects', 'c': 'complex numbers'}
 _SHAPES = {1: '({n},)', 2: '(N, {n})', None: '(..., {n})'}
 
 
@@ -80,17 +81,23 @@ def _values(q: ArrayLike, name: str, allowed: str) -> Array:
     try:
         values = np.asarray(q)
     except (OverflowError, TypeError, ValueError) as error:
-        fault = f'is not an array of numbers ({error})'
+        fault = f'is {_type_in_words(q)} of values that are no numbers, or too few or too many'
         raise JointVectorError(name, fault, allowed) from error
     is_masked = type(q).__module__.startswith('numpy.ma')  # whose import takes a start 7 ms
     is_number = values.dtype.kind in 'biuf' or not values.size
     if isinstance(q, (str, bytes)) or is_masked or not is_number:
-        found = type(q).__name__
+        found = _type_in_words(q)
         if values.ndim:
-            found += f' of {values.dtype.name}'
-        raise JointVectorError(name, f'is a {found}', allowed)
+            found += f' of {_KINDS.get(values.dtype.kind, values.dtype.name)}'
+        raise JointVectorError(name, f'is {found}', allowed)
     with np.errstate(over='ignore'):
         return values.astype(float, copy=False)
+
+
+def _type_in_words(q: object) -> str:
+    if q is None:
+        return 'None'
+    return 'an array' if isinstance(q, np.ndarray) else f'a {type(q).__name__}'
 
 
 def _refuse_not_finite(values: Array, name: str) -> None:

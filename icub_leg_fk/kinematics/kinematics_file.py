@@ -24,7 +24,10 @@ _DIRECTIONS = {
     'forward': (1, 0, 0), 'backward': (-1, 0, 0), 'left': (0, 1, 0), 'right': (0, -1, 0),
     'up': (0, 0, 1), 'down': (0, 0, -1)}
 _LONGEST = 1e9  # m; what is larger leaves no room to compute with
-_UNLIKELY = 100.0  # m
+_UNLIKELY = 10.0  # m
+_LIKELY = 0.005  # m; some length of a robot in mm is longer
+_ROUGHLY = 1e-4  # rad
+_QUARTERS = {1: 'pi/2', 2: 'pi', 3: '3*pi/2', 4: '2*pi'}
 _NO_RANGE = (-math.inf, math.inf)
 _FOUR_DECIMALS = 2e-4  # what rounding to four decimals may do to R R^T
 _EXACT = 1e-9  # below it a rotation was written with all its digits
@@ -149,6 +152,8 @@ class _Reader:
         root_frame = place['root_frame'].name('a frame id', FRAME_ID)
         joint_names = self._joint_names(place['joints'])
         links = self._links(Field(at.file, at.where, own['links'].node), joint_names)
+        T_root_0 = _given(own, 'T_Ro0', self._transform, np.eye(4))
+        self._doubt_lengths(at, links, T_root_0)
         return Chain(
             name=name,
             version=version,
@@ -156,7 +161,7 @@ class _Reader:
             tip=tip,
             joint_names=joint_names,
             links=standard_rows(links) if convention == 'modified' else tuple(links),
-            T_root_0=_given(own, 'T_Ro0', self._transform, np.eye(4)),
+            T_root_0=T_root_0,
             tip_frames=self._tip_frames(place['tip_frames'], root_frame),
             T_n_tip=_given(own, 'T_nIs', self._transform, np.eye(4)),
             convention=convention,
@@ -240,8 +245,8 @@ class _Reader:
         return DHLink(
             a=self._metres(fields['a']),
             d=self._metres(fields['d']),
-            alpha=self._radians(fields['alpha']),
-            offset=_given(fields, 'offset', self._radians, 0.0),
+            alpha=self._row_angle(fields['alpha']),
+            offset=_given(fields, 'offset', self._row_angle, 0.0),
             joint_type=joint_type,
             gain=_given(fields, 'gain', self._gain, 1.0),
             joint=joint,
@@ -299,6 +304,26 @@ class _Reader:
             self._warn(at, f'{value:g} rad is unlikely; the unit of angle is rad')
         return value
 
+    def _row_angle(self, at: Field) -> float:
+        """Return alpha or offset [rad]; a right angle of few decimals is doubtful."""
+        angle = self._radians(at)
+        quarters = round(abs(angle) / (math.pi / 2))
+        error = abs(abs(angle) - quarters * math.pi / 2)
+        is_rounded = self._angle == 'rad' and _is_rounded_fraction_of_pi(at.node.value)
+        if quarters in _QUARTERS and is_rounded and error > _ROUGHLY:
+            sign = '-' if angle < 0 else ''
+            self._warn(at, f'{angle:g} rad is {error:.1g} rad from {sign}{_QUARTERS[quarters]}, '
+                           'which can be written so')
+        return angle
+
+    def _doubt_lengths(self, at: Field, links: Sequence[DHLink], T_root_0: Array) -> None:
+        """Warn of metres in a table of millimetres."""
+        lengths = [abs(length) for link in links for length in (link.a, link.d)]
+        longest = max(*lengths, *np.abs(T_root_0[:3, 3]).tolist())
+        if self._length == 'mm' and 0.0 < longest < _LIKELY:
+            self._warn(at, f'{1000 * longest:g} mm for the longest length is unlikely; the unit '
+                           'of length is mm')
+
     def _transform(self, at: Field) -> Array:
         T = np.eye(4)
         for i, row in enumerate(at.items('4 rows of 4 numbers', 4)):
@@ -322,6 +347,8 @@ class _Reader:
 
 def _is_rounded_fraction_of_pi(text: str) -> bool:
     """Return whether a number is pi/12, or a few times that, as people round radians."""
+    if 'pi' in text:
+        return False
     decimals = len(text.partition('.')[2])
     part = math.pi / 2 if decimals == 2 else math.pi / 12
     times = round(float(text) / part)

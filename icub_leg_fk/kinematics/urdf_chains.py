@@ -11,10 +11,12 @@ from icub_leg_fk.kinematics.chain import Chain, TipFrame
 from icub_leg_fk.kinematics.kinematics_file import ChainEntry
 from icub_leg_fk.kinematics.rotation import angle_between
 from icub_leg_fk.kinematics.table_from_urdf import chain_from_urdf, VERSION
-from icub_leg_fk.kinematics.urdf_file import Urdf, UrdfJoint
+from icub_leg_fk.kinematics.urdf_file import JointElement, Urdf, UrdfJoint
 import numpy as np
 
 _SAME_AXES = 0.1  # rad
+_LARGEST_ANGLE = 2 * math.pi + 1e-3  # rad
+_LARGEST_LENGTH = 10.0  # m
 _LIMIT_IN_DEGREES = (4 * math.pi + 1e-3, 720.0)  # whole numbers between are hardly radians
 
 
@@ -124,22 +126,35 @@ class UrdfChains(Mapping[str, ChainEntry]):
 
 
 def doubts(urdf: Urdf) -> tuple[str, ...]:
-    """Return what can be computed with but can hardly be meant, one line each: degrees."""
-    lines = []
+    """Return what can be computed with but can hardly be meant, one line each: degrees and mm."""
+    joints_by_doubt: dict[str, list[str]] = {}
     for joint in urdf.joints:
-        angles = _numbers(joint.texts.get(('origin', 'rpy'), ''))
-        if any(abs(angle) > 2 * math.pi + 1e-3 for angle in angles):
-            lines.append(f'{urdf.file}: joint {joint.name}: an rpy of '
-                         f'{joint.texts["origin", "rpy"]} is unlikely; it is in rad')
-        limits = [*_numbers(joint.texts.get(('limit', 'lower'), '')),
-                  *_numbers(joint.texts.get(('limit', 'upper'), ''))]
-        low, high = _LIMIT_IN_DEGREES
-        in_degrees = [f'{limit:g}' for limit in limits
-                      if low < abs(limit) <= high and limit == round(limit)]
-        if joint.kind == 'revolute' and in_degrees:
-            lines.append(f'{urdf.file}: joint {joint.name}: a limit of {" and ".join(in_degrees)} '
-                         'is unlikely; it is in rad')
+        for kind, doubt in _doubts_of_joint(joint).items():
+            joints_by_doubt.setdefault(kind, []).append(f'joint {joint.name}: {doubt}')
+    lines = []
+    for found in joints_by_doubt.values():
+        others = len(found) - 1
+        more = f' (and {others} more joint{"s" * (others != 1)} like this)' if others else ''
+        lines.append(f'{urdf.file}: {found[0]}{more}')
     return tuple(lines)
+
+
+def _doubts_of_joint(joint: JointElement) -> dict[str, str]:
+    """Return what is doubtful in a joint, by kind."""
+    found = {}
+    rpy, xyz = (joint.texts.get(('origin', key), '') for key in ('rpy', 'xyz'))
+    if any(abs(angle) > _LARGEST_ANGLE for angle in _numbers(rpy)):
+        found['rpy'] = f'an rpy of {rpy} is unlikely; it is in rad'
+    if any(abs(length) > _LARGEST_LENGTH for length in _numbers(xyz)):
+        found['xyz'] = f'an xyz of {xyz} is unlikely; it is in m'
+    limits = [*_numbers(joint.texts.get(('limit', 'lower'), '')),
+              *_numbers(joint.texts.get(('limit', 'upper'), ''))]
+    low, high = _LIMIT_IN_DEGREES
+    in_degrees = [f'{limit:g}' for limit in limits
+                  if low < abs(limit) <= high and limit == round(limit)]
+    if joint.kind == 'revolute' and in_degrees:
+        found['limit'] = f'a limit of {" and ".join(in_degrees)} is unlikely; it is in rad'
+    return found
 
 
 def _numbers(text: str) -> list[float]:

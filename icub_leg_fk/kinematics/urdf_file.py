@@ -11,7 +11,8 @@ import re
 import sys
 from typing import NamedTuple, NoReturn
 
-from icub_leg_fk.errors import CatalogError, closest, InputFileError, UnknownNameError
+from icub_leg_fk.errors import closest, InputFileError, UnknownNameError
+from icub_leg_fk.kinematics.input_bytes import first_bytes, shown
 from icub_leg_fk.kinematics.rotation import Array, quaternion_to_matrix, turns_about
 from icub_leg_fk.kinematics.urdf_xml import REPLACEMENT, robot_element, tag
 from lxml import etree
@@ -116,8 +117,11 @@ class Urdf:
         Raises:
             InputFileError: it cannot be read or is not a URDF; says why.
         """
-        file = str(path) if str(path).isprintable() else repr(str(path))
-        return cls.parse(_bytes(file, path), file)
+        file = shown(path)
+        data = first_bytes(path, _LARGEST_FILE + 1)
+        if len(data) > _LARGEST_FILE:
+            raise InputFileError(file, f'has more than {_LARGEST_FILE} bytes; a URDF is smaller')
+        return cls.parse(data, file)
 
     @classmethod
     def parse(cls, data: bytes, file: str) -> Urdf:
@@ -152,10 +156,12 @@ class Urdf:
         """Return the link that poses are given in if no other is named.
 
         Raises:
-            InputFileError: there is no `root_link`, and not one link alone at the top.
+            InputFileError: there is no link, or no `root_link` and several at the top.
         """
         if 'root_link' in self.links:
             return 'root_link'
+        if not self.links:
+            self._fail('has no links')
         children = {joint.child for joint in self.joints}
         tops = [link for link in self.links if link not in children]
         if len(tops) != 1:
@@ -182,7 +188,7 @@ class Urdf:
         if guess is None:
             guess = next((name for name in self.links if link.casefold() in name.casefold()), None)
         advice = f'did you mean {guess!r}?' if guess and guess not in ends else ''
-        raise UnknownNameError(f'link of {self.file}', link, ends, advice)
+        raise UnknownNameError('link', link, ends, advice, of=self.file)
 
     def path(self, root: str, tip: str) -> tuple[UrdfJoint, ...]:
         """Return the joints from one link to another.
@@ -283,6 +289,8 @@ class Urdf:
         for link in (joint.parent, joint.child):
             if link not in self._links:
                 self._fail(f'joint {joint.name!r} names the link {link!r}, which is not there')
+        if not joint.name:
+            self._fail(f'the joint from {joint.parent!r} to {joint.child!r} has no name')
         for name in (joint.name, joint.parent, joint.child):
             if REPLACEMENT in name:
                 self._fail(f'the name {name!r} has a byte that is no text')
@@ -379,18 +387,6 @@ class Urdf:
 
     def __repr__(self) -> str:
         return f'<Urdf {self.name[:40]}: {len(self.links)} links, {len(self.joints)} joints>'
-
-
-def _bytes(file: str, path: str | Path) -> bytes:
-    try:
-        with open(path, 'rb') as stream:
-            data = stream.read(_LARGEST_FILE + 1)
-    except (OSError, ValueError) as error:  # a ValueError for a zero byte in the path
-        reason = getattr(error, 'strerror', None) or str(error)
-        raise CatalogError(file, 0, '', reason.lower(), 'a readable URDF') from None
-    if len(data) > _LARGEST_FILE:
-        raise InputFileError(file, f'has more than {_LARGEST_FILE} bytes; a URDF is smaller')
-    return data
 
 
 def _joint_element(element: etree._Element) -> JointElement:

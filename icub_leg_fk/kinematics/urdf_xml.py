@@ -8,6 +8,7 @@ forgiven. Every other is refused, since what lxml makes of it is a guess.
 
 from __future__ import annotations
 
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 import re
 from typing import NoReturn
 
@@ -62,7 +63,9 @@ def _text(data: bytes, file: str) -> str:
     """Return the XML with what is forgiven taken out; its lines keep their numbers."""
     start = data.find(b'<')
     if start < 0:
-        raise InputFileError(file, 'is not XML: it has no element')
+        _refuse_without_element(data, file)
+    if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
+        raise InputFileError(file, 'is not XML: it is UTF-16 text; allowed: UTF-8')
     if _ECHOED.search(data[:start]):
         text = _echoed(data, file)
     else:
@@ -78,6 +81,14 @@ def _text(data: bytes, file: str) -> str:
     text = _NO_TEXT.sub(REPLACEMENT, text)
     text = _VALUE.sub(_with_its_newlines, text)
     return _BARE_AMPERSAND.sub('&amp;', text)
+
+
+def _refuse_without_element(data: bytes, file: str) -> NoReturn:
+    if not data.strip():
+        raise InputFileError(file, 'is not XML: it is empty')
+    if b'chains:' in data:
+        raise InputFileError(file, 'is a kinematics file; allowed here: a URDF')
+    raise InputFileError(file, 'is not XML: it has no element')
 
 
 def _without_what_follows(text: str) -> str:

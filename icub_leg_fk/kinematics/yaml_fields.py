@@ -17,6 +17,7 @@ import reprlib
 from typing import Any, NoReturn
 
 from icub_leg_fk.errors import CatalogError, closest
+from icub_leg_fk.kinematics.input_bytes import first_bytes, shown
 import yaml
 
 MAX_BYTES = 1_000_000
@@ -184,8 +185,10 @@ def read_yaml(path: str | Path) -> Field:
     Raises:
         CatalogError: it cannot be read, is too large, or is not one document of YAML.
     """
-    file = str(path) if str(path).isprintable() else repr(str(path))
-    data = _read(file, path)
+    file = shown(path)
+    data = first_bytes(path, MAX_BYTES + 1)
+    if len(data) > MAX_BYTES:
+        _fail(file, 0, f'more than {MAX_BYTES} bytes', f'at most {MAX_BYTES} bytes')
     try:
         node = yaml.compose(data, Loader=Loader)
     except yaml.reader.ReaderError as error:  # bytes that are no text, or no printable text
@@ -206,15 +209,3 @@ def read_yaml(path: str | Path) -> Field:
 
 def _fail(file: str, line: int, found: str, allowed: str) -> NoReturn:
     raise CatalogError(file, line, 'kinematics file', found, allowed) from None
-
-
-def _read(file: str, path: str | Path) -> bytes:
-    try:
-        with open(path, 'rb') as stream:
-            data = stream.read(MAX_BYTES + 1)
-    except (OSError, ValueError) as error:  # a ValueError for a zero byte in the path
-        reason = getattr(error, 'strerror', None) or str(error)
-        raise CatalogError(file, 0, '', reason.lower(), 'a readable kinematics file') from None
-    if len(data) > MAX_BYTES:
-        _fail(file, 0, f'more than {MAX_BYTES} bytes', f'at most {MAX_BYTES} bytes')
-    return data

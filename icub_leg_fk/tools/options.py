@@ -1,13 +1,12 @@
 """What subcommands share: options by their names, and the chains and joint positions they mean."""
 
 import argparse
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 import math
 import sys
 from typing import Any
 
-from icub_leg_fk.errors import JointVectorError, LegFKError, UnknownNameError
+from icub_leg_fk.errors import InputFileError, JointVectorError, LegFKError
 from icub_leg_fk.kinematics import Catalog, Chain, ChainEntry
 from icub_leg_fk.stream.configuration import LEGS
 
@@ -64,21 +63,26 @@ def number_between(low: float, high: float, allowed: str = '') -> Callable[[str]
 
 def load_catalog(args: argparse.Namespace) -> Catalog:
     """Return the catalog that `-k` names, with a line on stderr for each of its warnings."""
-    for option in ('kinematics_file', 'version', 'foot_frame'):
+    for option in ('kinematics_file', 'root', 'version', 'foot_frame'):
         if getattr(args, option, None) == '':  # as an unset variable of the shell leaves it
             words = option.replace('_', '-')
             raise LegFKError(f'--{words} is empty; leave it out for its default')
-    catalog = Catalog.load(args.kinematics_file)
+    catalog = Catalog.load(args.kinematics_file, root=getattr(args, 'root', None))
     for line in catalog.warnings:
         print(f'leg_fk: warning: {line}', file=sys.stderr)
     return catalog
 
 
+def refuse_no_chains(catalog: Catalog) -> None:
+    """Refuse a URDF without chains."""
+    if not catalog.chains:
+        raise InputFileError(catalog.file, 'has no chain: no joint moves a link at its ends')
+
+
 def load_chain(args: argparse.Namespace) -> tuple[Catalog, Chain]:
     """Return the catalog, and the chain that the options name."""
     catalog = load_catalog(args)
-    with advice_on_chains(catalog):
-        return catalog, catalog.chain(args.chain, args.version, args.foot_frame)
+    return catalog, catalog.chain(args.chain, args.version, args.foot_frame)
 
 
 def chains_of_one_root(args: argparse.Namespace) -> list[Chain]:
@@ -89,8 +93,7 @@ def chains_of_one_root(args: argparse.Namespace) -> list[Chain]:
     """
     catalog = load_catalog(args)
     legs = [name for name in LEGS if name in catalog.chains]
-    with advice_on_chains(catalog):
-        chains = catalog.select(args.chains or legs or catalog.chains, args.version)
+    chains = catalog.select(args.chains or legs or catalog.chains, args.version)
     roots = sorted({chain.root_frame for chain in chains})
     if len(roots) > 1:
         raise LegFKError(f'the chains have the root frames {", ".join(roots)}; allowed: chains of '
@@ -98,18 +101,6 @@ def chains_of_one_root(args: argparse.Namespace) -> list[Chain]:
     if not args.foot_frame:
         return list(chains)
     return [chain.with_frame(args.foot_frame) for chain in chains]
-
-
-@contextmanager
-def advice_on_chains(catalog: Catalog) -> Iterator[None]:
-    """Where a tip or a frame is given for a chain, let the error say which chain has it."""
-    try:
-        yield
-    except UnknownNameError as error:
-        owner = _owner(catalog, error.name)
-        if error.kind != 'chain' or not owner:
-            raise
-        raise UnknownNameError(error.kind, error.name, error.choices, owner) from error
 
 
 def joint_positions(args: argparse.Namespace, chain: Chain) -> list[float] | None:
@@ -151,18 +142,6 @@ def _warn_of_degrees(chain: Chain, q: list[float]) -> None:
     if doubtful:
         print(f'leg_fk: warning: positions look like degrees, for which there is --degrees: '
               f'{", ".join(doubtful)}', file=sys.stderr)
-
-
-def _owner(catalog: Catalog, name: str) -> str:
-    """Return whose tip or frame a name is; nothing if it is neither."""
-    for entry in catalog.chains.values():
-        if name == entry.tip:
-            return f'{name} is the tip of {entry.name}'
-        for chain in entry.versions.values():
-            for frame, tip_frame in chain.tip_frames.items():
-                if name == tip_frame.frame_id:
-                    return f'{name} is {entry.name} with --foot-frame {frame}'
-    return ''
 
 
 def _complete_chain(prefix: str, parsed_args: argparse.Namespace, **_: Any) -> list[str]:
@@ -233,8 +212,12 @@ _OPTIONS: dict[str, dict[str, Any]] = {
         'help': 'print JSON, for programs'},
     '--kinematics-file': {
         'metavar': 'FILE',
-        'help': "a kinematics file, with the DH tables of any robot (default: the iCub's, as "
-                'shipped)'},
+        'help': "a kinematics file, with the DH tables of any robot, or a URDF (default: the "
+                "iCub's tables, as shipped)"},
+    '--root': {
+        'metavar': 'LINK',
+        'help': 'of a URDF, the link that poses are given in (default: root_link, or the top of '
+                'the tree)'},
     '--force': {
         'action': 'store_true',
         'help': 'replace what exists already'},

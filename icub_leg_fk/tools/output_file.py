@@ -39,7 +39,7 @@ def whole_path(path: str | Path, *, force: bool,
                     target.rename(Path(work, 'replaced'))
                 new.replace(target)
     except OSError as error:
-        raise OutputFileError(str(path), error.strerror or str(error)) from error
+        raise _cannot_be_written(path, error) from error
 
 
 def check_target(path: str | Path, *, force: bool,
@@ -53,22 +53,32 @@ def check_target(path: str | Path, *, force: bool,
     target = Path(os.path.realpath(path))
     if not target.parent.is_dir():
         raise OutputFileError(str(path), f'there is no directory {target.parent}')
-    if not os.path.lexists(target):
-        return
-    if not may_replace(target):
-        raise OutputFileError(str(path), 'exists already and is something else than what would be '
-                                         'written; nothing replaces it')
-    if not force:
-        raise OutputFileError(str(path), 'exists already; --force replaces it')
+    if os.path.lexists(target):
+        if not may_replace(target):
+            raise OutputFileError(str(path), 'exists already and is something else than what '
+                                             'would be written; nothing replaces it')
+        if not force:
+            raise OutputFileError(str(path), 'exists already; --force replaces it')
+    try:
+        tempfile.TemporaryDirectory(prefix=f'.{target.name}.', dir=target.parent).cleanup()
+    except OSError as error:
+        raise _cannot_be_written(path, error) from error
+
+
+def _cannot_be_written(path: str | Path, error: OSError) -> OutputFileError:
+    reason = error.strerror or str(error)
+    return OutputFileError(str(path), f'cannot be written: {reason.lower()}')
 
 
 def refuse_option_like(path: str | Path) -> None:
-    """Refuse the name of an output that begins as an option does.
+    """Refuse an output without a name, or with one that begins as an option does.
 
     Raises:
-        OutputFileError: says how such a file can be named all the same.
+        OutputFileError: says why, and how such a file can be named all the same.
     """
     name = str(path).strip()
+    if not name or not Path(path).name:
+        raise OutputFileError(repr(str(path)), 'is not the name of a file')
     if name == STANDARD_OUTPUT:
         raise OutputFileError(name, 'is standard output, which does not take this; allowed: the '
                                     'name of a file')

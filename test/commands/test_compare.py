@@ -123,8 +123,8 @@ def test_a_robot_without_the_joints_says_what_it_has(tmp_path: Path) -> None:
     file = tmp_path / 'cart.urdf'
     file.write_text(robot([joint(0, 'continuous')]))
     assert_one_line_complaint(run_main('compare', file),
-                              'cannot be compared: left_leg: not compared: the robot has no link '
-                              'root_link; right_leg: ')
+                              'cannot be compared: left_leg: the robot has no link root_link; '
+                              'right_leg: ')
     assert_one_line_complaint(run_main('compare', file, '--chains', 'left_lag'),
                               "did you mean 'left_leg'?")
     assert_one_line_complaint(run_main('compare', tmp_path / 'none.urdf'), 'no such file')

@@ -14,6 +14,7 @@ from icub_leg_fk.__main__ import COMMANDS, main
 from icub_leg_fk.kinematics import Catalog, config_file
 import pytest
 from support.leg_fk_process import COMMAND, leg_fk, run_main
+from support.robots import joint, robot
 
 ARM = config_file('examples/cylindrical_arm.yaml')
 ZEROS = '0 0 0 0 0 0'
@@ -39,9 +40,9 @@ ANSWERS = [
     (f'pose left_arm --degrees {ZEROS}', 2, "'left_arm'; known: left_leg, right_leg, head_imu"),
     (f'pose Left_Leg --degrees {ZEROS}', 2, "did you mean 'left_leg'?"),
     (f'pose left_foot --degrees {ZEROS}', 2, 'left_foot is the tip of left_leg'),
-    (f'pose r_sole --degrees {ZEROS}', 2, 'r_sole is right_leg with --foot-frame sole'),
+    (f'pose r_sole --degrees {ZEROS}', 2, 'r_sole is the sole frame of right_leg'),
     (f'pose left_leg --version V2_5 --degrees {ZEROS}', 2,
-     "'V2_5'; did you mean 'v2_5'? known: v1, v2_5, v3"),
+     "'V2_5' of chain left_leg; did you mean 'v2_5'? known: v1, v2_5, v3"),
     (f'pose left_leg=v9 --degrees {ZEROS}', 2, 'known: v1, v2_5, v3'),
     (f'pose left_leg --version "" --degrees {ZEROS}', 2, 'is empty; leave it out for its default'),
     (f'pose left_leg --foot-frame toe --degrees {ZEROS}', 2, 'known: dh, sole'),
@@ -83,7 +84,70 @@ ANSWERS = [
     ('urdf left_leg -o -x.urdf', 2, 'unknown option -x.urdf'),
     ('urdf left_leg -o /dev/null', 2, '/dev/null'),
     ('urdf left_leg -o /no/such/folder/x.urdf', 2, 'there is no directory'),
+    ('urdf left_leg -o /proc/x.urdf', 2, '/proc/x.urdf: cannot be written: no such file'),
+    ('urdf left_leg -o ""', 2, "'': is not the name of a file"),
+    ('urdf left_leg -o /', 2, "'/': is not the name of a file"),
+    ('demo -o /proc/x.png', 2, '/proc/x.png: cannot be written: no such file'),
+    ('demo -o ""', 2, 'is not the name of a file'),
+    ('demo --save /proc/x', 2, '/proc/x: cannot be written: no such file'),
 ]
+
+# Files that are not what is asked for.
+FILES = {
+    'empty': b' \n',
+    'bytes': bytes(range(256)),
+    'text.txt': b'left_leg',
+    'arm.yaml': ARM.read_bytes(),
+    'page.html': b'<!DOCTYPE html><html/>',
+    'links.urdf': b'<robot name="r"><link name="base"/><link name="base2"/></robot>',
+    'link.urdf': b'<robot name="r"><link name="base"/></robot>',
+    'nothing.urdf': b'<robot name="r"/>',
+    'utf16.urdf': '<robot name="r"><link name="base"/></robot>'.encode('utf-16'),
+    'arm.urdf': robot([joint(0), joint(1)]).encode(),
+    'arm.xacro': b'<robot xmlns:xacro="x"><xacro:include filename="f"/></robot>',
+}
+
+# What is typed, and words of the answer, whose exit status is 2.
+ANSWERS_ON_FILES = [
+    ('list -k empty', 'found nothing, allowed: units and chains'),
+    ('list -k bytes', 'no printable UTF-8 text'),
+    ('list -k text.txt', "found 'left_leg', allowed: a mapping with units"),
+    ('list -k page.html', 'is not a URDF: its root is <html>'),
+    ('list -k link.urdf', 'has no chain: no joint moves a link at its ends'),
+    ('list -k links.urdf', 'has 2 links at the top (base, base2)'),
+    ('list -k nothing.urdf', 'has no links'),
+    ('list -k utf16.urdf', 'is UTF-16 text; allowed: UTF-8'),
+    ('list -k arm.xacro', 'xacro arm.xacro > robot.urdf'),
+    ('urdf -k link.urdf', 'has no chain'),
+    ('list -k arm.urdf --root l9', "unknown link 'l9' of arm.urdf; "),
+    ('list -k arm.urdf --root ""', '--root is empty; leave it out for its default'),
+    ('pose l2 -k arm.urdf --root l1 --degrees 0 0', '2 entries; allowed: 1, in the order j1'),
+    ('explain l1 -k arm.urdf --root l1', "no joint moves between 'l1' and 'l1'"),
+    ('pose left_leg -k arm.urdf --degrees 0', "unknown chain 'left_leg'; known: l2"),
+    ('table empty', 'is empty'),
+    ('table ""', "cannot read '': no such file"),
+    ('table text.txt', 'it has no element'),
+    ('table arm.yaml', 'is a kinematics file; allowed here: a URDF'),
+    ('table link.urdf', 'has no chain'),
+    ('table nothing.urdf', 'has no links'),
+    ('table arm.urdf', "has none of the iCub's chains; give --tips, such as l2"),
+    ('table arm.urdf --tips l9', "unknown chain 'l9'"),
+    ('compare arm.yaml', 'is a kinematics file; allowed here: a URDF'),
+    ('compare arm.urdf', '-k takes tables with the names of this robot'),
+    ('compare arm.urdf --chains left_leg=v9', "unknown version 'v9' of chain left_leg"),
+    ('compare arm.urdf --chains l_sole', 'l_sole is the sole frame of left_leg'),
+]
+
+
+@pytest.mark.parametrize(('typed', 'answer'), ANSWERS_ON_FILES)
+def test_an_answer_on_a_wrong_file_is_one_line_that_helps(typed, answer, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name, content in FILES.items():
+        Path(name).write_bytes(content)
+    done = run_main(*shlex.split(typed))
+    assert (done.returncode, done.stdout) == (2, '')
+    assert done.stderr.startswith('leg_fk: error: ') and done.stderr.count('\n') == 1
+    assert answer in done.stderr
 
 
 @pytest.mark.parametrize(('typed', 'status', 'answer'), ANSWERS)
@@ -204,7 +268,7 @@ def test_a_full_disk_is_reported_in_one_line():
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_the_command_quietly(monkeypatch, number):
-    monkeypatch.setattr(Catalog, 'load', lambda path: signal.raise_signal(number))
+    monkeypatch.setattr(Catalog, 'load', lambda *_, **__: signal.raise_signal(number))
     done = run_main('list')
     assert (done.returncode, done.stdout, done.stderr) == (128 + number, '', '')
 
@@ -212,7 +276,7 @@ def test_a_signal_ends_the_command_quietly(monkeypatch, number):
 def test_a_signal_that_is_ignored_as_by_nohup_stays_so(monkeypatch):
     shipped = Catalog.load()
 
-    def load(path):
+    def load(*_, **__):
         signal.raise_signal(signal.SIGHUP)
         return shipped
 
@@ -252,3 +316,9 @@ def test_the_shell_is_offered_what_fits(line, offered, tmp_path):
                         '_ARGCOMPLETE_IFS': '\n', '_ARGCOMPLETE_STDOUT_FILENAME': str(answer),
                         '_ARGCOMPLETE_COMP_WORDBREAKS': '='})
     assert {word.strip() for word in answer.read_text().splitlines()} == offered
+
+
+def test_a_closed_stderr_leaves_standard_output_alone(monkeypatch, capsys):
+    monkeypatch.setattr(sys, 'stderr', None)
+    assert main(['lsit']) == 2
+    assert capsys.readouterr().out == ''

@@ -145,3 +145,12 @@ def test_a_bad_urdf_or_name_is_refused_in_one_line(tmp_path: Path) -> None:
         assert_one_line_complaint(done, complaint)
     assert_one_line_complaint(run_main('table', tmp_path / 'none.urdf', *WORDS),
                               'no such file or directory')
+
+
+def test_a_minus_sign_is_standard_output(tmp_path: Path) -> None:
+    file = tmp_path / 'arm.urdf'
+    file.write_text(robot([joint(0), joint(1, xyz='0.3 0 0')]))
+    printed = run_main('table', file, '--tips', 'l2', '-o', '-')
+    assert printed.returncode == 0
+    assert printed.stdout == run_main('table', file, '--tips', 'l2').stdout
+    assert 'largest difference' in printed.stderr

@@ -123,12 +123,18 @@ def test_version_3_names_its_source_which_is_not_the_documents() -> None:
 @pytest.mark.parametrize(('arguments', 'message'), [
     (('left_arm', 'v2_5'),
      "unknown chain 'left_arm'; known: left_leg, right_leg, head_imu"),
+    (('left_foot',),
+     "unknown chain 'left_foot'; known: left_leg, right_leg, head_imu; "
+     'left_foot is the tip of left_leg'),
+    (('r_sole',),
+     "unknown chain 'r_sole'; known: left_leg, right_leg, head_imu; "
+     'r_sole is the sole frame of right_leg'),
     (('left_leg', 'v2.5'),
-     "unknown version of chain left_leg 'v2.5'; did you mean 'v2_5'? known: v1, v2_5, v3"),
+     "unknown version 'v2.5' of chain left_leg; did you mean 'v2_5'? known: v1, v2_5, v3"),
     (('head_imu', 'v2', 'sole'),
-     "unknown tip frame of chain head_imu 'sole'; known: dh"),
+     "unknown tip frame 'sole' of chain head_imu; known: dh"),
     (('left_leg', 'v2_5', 'toe'),
-     "unknown tip frame of chain left_leg 'toe'; known: dh, sole"),
+     "unknown tip frame 'toe' of chain left_leg; known: dh, sole"),
 ])
 def test_an_unknown_name_lists_the_known_ones(arguments: tuple[str, ...], message: str) -> None:
     with pytest.raises(UnknownNameError) as error:
@@ -137,7 +143,7 @@ def test_an_unknown_name_lists_the_known_ones(arguments: tuple[str, ...], messag
 
 
 def test_a_version_that_one_chain_lacks_is_answered_with_the_way_to_name_it() -> None:
-    message = r"chain head_imu 'v1'; .*known: v2, v3; .*head_imu=v2"
+    message = r"'v1' of chain head_imu; .*known: v2, v3; .*head_imu=v2"
     with pytest.raises(UnknownNameError, match=message):
         CATALOG.select(['left_leg', 'head_imu'], 'v1')
     chosen = CATALOG.select(['left_leg', 'head_imu=v2'], 'v1')
@@ -159,10 +165,11 @@ def test_the_files_default_versions_count_where_none_is_given() -> None:
     (['left_leg=v3', 'right_leg'], 'left_leg=v3 and right_leg=v2_5 do not go together: x, y, z of '
                                    'root_link point forward, left, up in the one and backward, '
                                    'right, up in the other'),
-    (['left_leg=v9'], "unknown version of chain left_leg 'v9'; known: v1, v2_5, v3"),
+    (['left_leg=v9'], "unknown version 'v9' of chain left_leg; known: v1, v2_5, v3"),
+    ('left_leg', "chains are 'left_leg'; allowed: a list of names"),
     (['left_leg='], "unknown chain 'left_leg='; did you mean 'left_leg'?"),
 ])
-def test_chains_that_cannot_be_used_together_are_refused(names: list[str], words: str) -> None:
+def test_chains_that_cannot_be_used_together_are_refused(names: Any, words: str) -> None:
     with pytest.raises(LegFKError) as error:
         CATALOG.select(names)
     assert words in str(error.value)

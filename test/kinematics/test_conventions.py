@@ -216,6 +216,28 @@ def test_radians_in_a_file_of_degrees_are_computed_and_reported(tmp_path: Path) 
     assert Catalog.load(file).chain('arm', 'v1').links[0].alpha == np.radians(1.5708)
 
 
+@pytest.mark.parametrize(('units', 'row', 'doubt'), [
+    ('mm, angle: deg', 'a: 0.3, d: 0, alpha: 90', '0.3 mm for the longest length is unlikely'),
+    ('mm, angle: deg', 'a: 0, d: 0, alpha: 90', ''),
+    ('mm, angle: deg', 'a: 6, d: 0, alpha: 90', ''),
+    ('m, angle: deg', 'a: 30, d: 0, alpha: 90', '30 m is unlikely; the unit of length is m'),
+    ('m, angle: rad', 'a: 1, d: 0, alpha: 1.57', '1.57 rad is 0.0008 rad from pi/2, which'),
+    ('m, angle: rad', 'a: 1, d: 0, alpha: -3.14', '-3.14 rad is 0.002 rad from -pi, which'),
+    ('m, angle: rad', 'a: 1, d: 0, alpha: 1.5708', ''),
+    ('m, angle: rad', 'a: 1, d: 0, alpha: pi/2', ''),
+    ('m, angle: rad', 'a: 1, d: 0, alpha: 1.55', ''),
+    ('m, angle: deg', 'a: 1, d: 0, alpha: 3.14', '3.14 deg is unlikely'),
+])
+def test_a_table_in_another_unit_is_doubted(units: str, row: str, doubt: str,
+                                            tmp_path: Path) -> None:
+    file = tmp_path / 'arm.yaml'
+    file.write_text(f'units: {{length: {units}}}\nchains:\n  arm:\n    tip: tool\n'
+                    '    root_frame: base\n    joints: [j]\n    tip_frames: {dh: {frame: t}}\n'
+                    f'    versions: {{v1: {{links: [{{{row}}}]}}}}\n')
+    warnings = Catalog.load(file).warnings
+    assert len(warnings) == bool(doubt) and doubt in ''.join(warnings)
+
+
 def test_three_decimals_are_too_few_for_a_rotation(arm: Path) -> None:
     arm.write_text(ARM.replace('0.7071', '0.707'))
     with pytest.raises(CatalogError, match=r'not a rigid transform.*four decimals'):

@@ -50,10 +50,10 @@ def test_chains_whose_topics_would_have_one_name_are_not_used_together(tmp_path:
 
 def test_another_root_may_be_named(arm: Path) -> None:
     assert load_chain('l2', file=arm, root='l1').joint_names == ('j1',)
-    with pytest.raises(UnknownNameError, match=r"unknown link of .* 'l9'; .*known: l4"):
+    with pytest.raises(UnknownNameError, match=r"unknown link 'l9' of .*; .*known: l4"):
         Catalog.load(arm, root='l9')
     catalog = Catalog.load(ROOT / 'config' / 'examples' / 'ur5.yaml', root='base')
-    assert "is no URDF; the root link 'base' is not looked at" in catalog.warnings[0]
+    assert "is not a URDF; the root link 'base' is ignored" in catalog.warnings[0]
 
 
 def test_what_is_no_chain_says_why(arm: Path) -> None:
@@ -62,7 +62,7 @@ def test_what_is_no_chain_says_why(arm: Path) -> None:
         catalog.chain('l4')
     with pytest.raises(InputFileError, match="no joint moves between 'l0' and 'l0'"):
         catalog.chain('l0')
-    with pytest.raises(UnknownNameError, match="unknown version of chain l1 'v1'; known: urdf"):
+    with pytest.raises(UnknownNameError, match="unknown version 'v1' of chain l1; known: urdf"):
         catalog.chain('l1', 'v1')
     with pytest.raises(UnknownNameError, match="unknown chain 'l7'; known: none"):
         catalog.chain('l7')
@@ -94,7 +94,7 @@ def test_an_icub_3_has_only_its_soles() -> None:
     assert leg.sole_outline([0.0] * 6).shape == (4, 3)
     shipped = load_chain('left_leg', 'v3', frame='sole')
     assert difference(leg.forward, shipped.forward, postures(leg, 100)).mm < 0.12
-    with pytest.raises(UnknownNameError, match=r"left_leg 'dh'; known: sole"):
+    with pytest.raises(UnknownNameError, match="'dh' of chain left_leg; known: sole"):
         catalog.chain('left_leg', frame='dh')
     assert len(catalog.select(['left_leg', 'right_leg', 'l_sole'])) == 3
 
@@ -134,6 +134,10 @@ def test_degrees_in_a_urdf_are_computed_and_reported(tmp_path: Path) -> None:
     assert limits == f'{file}: joint j0: a limit of -180 and 180 is unlikely; it is in rad'
     with pytest.warns(UserWarning, match='is unlikely'):
         load_chain('l2', file=file)
+    file.write_text(robot([joint(i, xyz='0 0 300') for i in range(3)]))
+    assert Catalog.load(file).warnings == (
+        f'{file}: joint j0: an xyz of 0 0 300 is unlikely; it is in m (and 2 more joints like '
+        'this)',)
 
 
 @needs_robots

@@ -294,7 +294,7 @@ def test_an_unknown_link_lists_the_links_at_the_ends() -> None:
     with pytest.raises(UnknownNameError) as error:
         chain_from_urdf(urdf, 'l0', 'elbow')
     assert str(error.value) == (
-        "unknown link of robot.urdf 'elbow'; known: l2; did you mean 'the_elbow'?")
+        "unknown link 'elbow' of robot.urdf; known: l2; did you mean 'the_elbow'?")
     with pytest.raises(UnknownNameError, match="did you mean 'l2'"):
         chain_from_urdf(urdf, 'l0', 'l22')
 
@@ -331,6 +331,8 @@ REFUSED = {
                     "link 'l1' has two parents"),
     'a ring': (robot([joint(0), joint(1).replace('l2', 'l0')], links=3), 'l2', 'l1',
                'is above itself'),
+    'no name': (robot([joint(0).replace('j0', ''), joint(1)]), 'l0', 'l2',
+                "the joint from 'l0' to 'l1' has no name"),
     'parent not there': (robot([joint(0), joint(1)]).replace('<link name="l1"/>', ''), 'l0', 'l2',
                          "names the link 'l1', which is"),
     'limits reversed': (robot([joint(0).replace('"-2"', '"3"')]), 'l0', 'l1', 'is above upper'),

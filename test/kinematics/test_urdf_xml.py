@@ -45,7 +45,8 @@ REFUSED = {
     'too deep': (PLAIN.replace(END, '<p>' * 300 + '</p>' * 300 + END), 'Excessive depth'),
     'too much': (PLAIN.replace(END, f'<p n="{"x" * 11_000_000}"/></robot>'), 'limit exceeded'),
     'no element': ('left_leg', 'it has no element'),
-    'nothing': ('', 'it has no element'),
+    'nothing': (' \n', 'it is empty'),
+    'UTF-16': ('\udcff\udcfe<\0r\0>\0', 'it is UTF-16 text; allowed: UTF-8'),
     'entities of entities': (
         '<!DOCTYPE r [<!ENTITY e0 "x">' + ''.join(
             f'<!ENTITY e{i} "&e{i - 1};&e{i - 1};">' for i in range(1, 60)) + ']><robot>&e59;',

@@ -93,7 +93,7 @@ def test_joint_timeout_and_stamps_change_live(feet):
 
 
 @pytest.mark.parametrize('changes, words', [
-    ({'version': 'v2.5'}, "unknown version of chain left_leg 'v2.5'; did you mean 'v2_5'?"),
+    ({'version': 'v2.5'}, "unknown version 'v2.5' of chain left_leg; did you mean 'v2_5'?"),
     ({'version': 'v1', 'frame_prefix': 'x/', 'foot_frame': 'toe'}, 'allowed: dh or sole'),
     ({'joint_timeout': float('nan')}, 'joint_timeout'),
     ({'joint_timeout': -0.1}, 'joint_timeout'),

@@ -22,12 +22,12 @@ RUN = [sys.executable, '-m', 'icub_leg_fk.node.main']
 
 # Arguments after --ros-args, and what the line says.
 BAD = {
-    '-p version:=v9': "parameter version: unknown version of chain left_leg 'v9'; known: v1, v2_5",
+    '-p version:=v9': "parameter version: unknown version 'v9' of chain left_leg; known: v1, v2_5",
     '-p version:=2.5': 'parameter version: found 2.5, allowed: a version of the kinematics file',
     '-p chains:=[]': 'parameter chains: no chain is named; allowed: one or more of left_leg',
     '-p chains:=left_leg': "parameter chains: found 'left_leg', allowed: a list of chains",
     '-p chains:=[1,2]': 'parameter chains: found [1, 2], allowed: a list of chains',
-    '-p chains:=[head_imu=v1]': "parameter chains: unknown version of chain head_imu 'v1'",
+    '-p chains:=[head_imu=v1]': "parameter chains: unknown version 'v1' of chain head_imu",
     '-p foot_frame:=toe': "parameter foot_frame: found 'toe', allowed: dh or sole",
     '-p joint_timeout:=-1.0': 'found -1.0, allowed: a number with a decimal point from 0.0',
     '-p joint_timeout:=.nan': 'parameter joint_timeout: found nan, allowed: a number',

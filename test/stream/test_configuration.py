@@ -96,10 +96,10 @@ def test_without_a_choice_the_first_frame_counts_which_is_said(arms):
 
 
 @pytest.mark.parametrize(('values', 'refused'), [
-    ({'version': 'v9'}, "version: unknown version of chain left_leg 'v9'; known: v1, v2_5, v3"),
-    ({'version': 'V1'}, 'version: unknown version of chain left_leg'),
+    ({'version': 'v9'}, "version: unknown version 'v9' of chain left_leg; known: v1, v2_5, v3"),
+    ({'version': 'V1'}, "version: unknown version 'V1' of chain left_leg"),
     ({'chains': ['left_leg', 'head_imu'], 'version': 'v1'}, 'as in head_imu=v'),
-    ({'chains': ['left_leg=v7']}, "chains: unknown version of chain left_leg 'v7'"),
+    ({'chains': ['left_leg=v7']}, "chains: unknown version 'v7' of chain left_leg"),
     ({'chains': ['lef_leg']}, "chains: unknown chain 'lef_leg'; did you mean 'left_leg'?"),
     ({'chains': []}, 'chains: no chain is named; allowed: one or more of left_leg, right_leg'),
     ({'chains': ['left_leg', 'left_leg=v1']}, 'chains: chain left_leg is named twice'),
