@@ -44,7 +44,7 @@ class _Run(NamedTuple):
 
 def measure_bag(report: Report, quick: bool) -> None:
     """Add speed, memory and two jobs."""
-    lengths = _Lengths(1, 2, 2) if quick else _Lengths(10, 90, 120)
+    lengths = _Lengths(1, 1, 1) if quick else _Lengths(10, 90, 120)
     with TemporaryDirectory(prefix='bench_bag_') as directory:
         runs, jobs = _run_all(Path(directory), lengths, rounds=1 if quick else 3)
     seconds = {}

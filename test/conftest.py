@@ -37,8 +37,10 @@ os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
-# How long an example takes says nothing on a busy machine.
-settings.register_profile('icub_leg_fk', deadline=None)
+# How long an example takes says nothing on a busy machine. Every run tries other examples;
+# `make test ARGS=--hypothesis-profile=thorough` tries more of them.
+settings.register_profile('icub_leg_fk', deadline=None, max_examples=50)
+settings.register_profile('thorough', deadline=None, max_examples=1000)
 settings.load_profile('icub_leg_fk')
 
 

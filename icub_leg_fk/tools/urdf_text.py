@@ -49,7 +49,6 @@ def urdf_text(robot: str, chains: Sequence[Chain]) -> str:
     return model.text()
 
 
-
 class _Model:
     """The robot element, as it grows chain by chain."""
 

@@ -87,20 +87,21 @@ def write_csv(path, times, positions):
 
 
 def test_every_pose_of_the_gait_arrives_and_is_drawn_and_kept():
-    done = run_main('demo', '--seconds', '2.5', '--save', 'walk')
+    done = run_main('demo', '--seconds', '1.5', '--save', 'walk')
     assert (done.returncode, done.stderr) == (0, '')
-    assert re.match(r'iCub legs v2_5: 251 JointState messages', done.stdout)
-    assert re.search(r'messages in +251\b', done.stdout)
-    assert re.search(r'poses out +502 +\(left_foot 251, right_foot 251\)', done.stdout)
-    assert re.search(r'lost +none', done.stdout)
-    assert re.search(r'latency +median [\d.]+ ms +p99 [\d.]+ ms +max [\d.]+ ms', done.stdout)
+    for said in (r'^iCub legs v2_5: 151 JointState messages',
+                 r'messages in +151\b',
+                 r'poses out +302 +\(left_foot 151, right_foot 151\)',
+                 r'lost +none',
+                 r'latency +median [\d.]+ ms +p99 [\d.]+ ms +max [\d.]+ ms'):
+        assert re.search(said, done.stdout)
     assert Path('demo.png').read_bytes().startswith(b'\x89PNG')
     assert sorted(path.name for path in Path().iterdir()) == ['demo.png', 'walk']
     # Without a terminal there is a plain line a second, and one of the last state.
     assert '\x1b' not in done.stdout
     lines = re.findall(r'^ +([\d.]+) s   in root_link: left foot: .*   right foot: x \S+',
                        done.stdout, re.MULTILINE)
-    assert lines[-1] == '2.50' and 2 <= len(lines) <= 4
+    assert lines[-1] == '1.50' and 2 <= len(lines) <= 3
     # What was sent can be converted and drawn.
     assert run_main('bag', 'walk', 'poses').returncode == 0
     assert run_main('plot', 'poses').returncode == 0
@@ -177,8 +178,7 @@ def test_node_that_dies_is_one_line_and_exit_1():
     assert 'the node stopped with exit status -9' in err
 
 
-@pytest.mark.parametrize(('number', 'early'), [
-    (signal.SIGINT, True), (signal.SIGINT, False), (signal.SIGTERM, False)])
+@pytest.mark.parametrize(('number', 'early'), [(signal.SIGINT, False), (signal.SIGTERM, True)])
 def test_signals_leave_no_process_and_no_file_behind(number, early):
     process = start('--seconds', '60', '--save', 'walk')
     node, = wait_until(lambda: children(process.pid))
@@ -197,7 +197,7 @@ def test_on_a_terminal_the_table_is_redrawn_in_place():
     pytest.importorskip('rich')
     controller, terminal = pty.openpty()
     environment = {**os.environ, 'TERM': 'xterm-256color', 'COLUMNS': '90', 'LINES': '30'}
-    process = subprocess.Popen([*DEMO, '--seconds', '2'], stdin=terminal, stdout=terminal,
+    process = subprocess.Popen([*DEMO, '--seconds', '1.5'], stdin=terminal, stdout=terminal,
                                stderr=terminal, env=environment)
     os.close(terminal)
     written = b''
@@ -210,8 +210,8 @@ def test_on_a_terminal_the_table_is_redrawn_in_place():
     assert process.wait(90) == 0
     shown = re.sub(r'\x1b\[[\d;?]*[A-Za-z]|\r', '', written.decode())
     table, _, summary = shown.partition('messages in')
-    assert 10 <= table.count('poses in root_link, in m') <= 25  # 10 a second
-    assert len(set(re.findall(r'left foot +(-?\d.*\d)', table))) >= 10  # it moves
+    assert 8 <= table.count('poses in root_link, in m') <= 20  # 10 a second
+    assert len(set(re.findall(r'left foot +(-?\d.*\d)', table))) >= 8  # it moves
     assert 'poses out' in summary and 'poses in' not in summary
 
 

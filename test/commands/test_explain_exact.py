@@ -1,5 +1,6 @@
 """`leg_fk explain` with sympy: exact numbers, formulas, and the LaTeX of both."""
 
+from itertools import product
 import json
 import re
 import shutil
@@ -9,9 +10,21 @@ import sys
 from icub_leg_fk.__main__ import main
 import numpy as np
 import pytest
-from support.explain_cases import Case, HEAD, in_metres, LEG, ODD_ARM, one_chain_of_each_kind, UR5
+from support.explain_cases import (
+    Case,
+    HEAD,
+    in_metres,
+    LEG,
+    ODD_ARM,
+    OF_EACH_KIND,
+    one_chain_of_each_kind,
+    UR5,
+)
 
 sympy = pytest.importorskip('sympy')
+
+FORMS = ['formula', 'decimals', 'exact']
+in_each_form = pytest.mark.parametrize('form', FORMS)
 
 LONG_ARM = """\
 units: {length: mm, angle: deg}
@@ -120,16 +133,17 @@ sys.exit(main(['explain', 'left_leg']))
     assert done.stderr.count('\n') == 1 and 'pip install sympy' in done.stderr
 
 
-@pytest.fixture(params=['formula', 'decimals', 'exact'])
-def document(request, case):
+def latex(case, form):
     """Return a chain's explanation in LaTeX."""
     _, words = case.radians(7)
     forms = {'formula': [], 'decimals': words, 'exact': [*words, '--symbolic']}
-    return case.explain('--latex', *forms[request.param])
+    return case.explain('--latex', *forms[form])
 
 
+@in_each_form
 @one_chain_of_each_kind
-def test_latex_is_complete(document, case):
+def test_latex_is_complete(case, form):
+    document = latex(case, form)
     assert document.startswith(r'\documentclass')
     assert document.rstrip().endswith(r'\end{document}')
     assert f'{len(case.chain.rows()) - 1}}}' in document
@@ -139,8 +153,10 @@ def test_latex_is_complete(document, case):
         assert [row.count('&') for row in matrix.split(r'\\')] == [3, 3, 3, 3]
 
 
+@in_each_form
 @one_chain_of_each_kind
-def test_latex_is_balanced(document, case):
+def test_latex_is_balanced(case, form):
+    document = latex(case, form)
     is_open = ['']
     for kind, name in re.findall(r'\\(begin|end)\{([a-z]+)\}', document):
         if kind == 'begin':
@@ -158,11 +174,15 @@ def test_latex_is_balanced(document, case):
 
 
 @pytest.mark.skipif(not shutil.which('pdflatex'), reason='pdflatex is not installed')
-@one_chain_of_each_kind
-def test_latex_takes_the_document_and_no_line_is_too_long(document, case, tmp_path):
-    (tmp_path / 'e.tex').write_text(document)
-    done = subprocess.run(['pdflatex', '-interaction=nonstopmode', 'e.tex'], cwd=tmp_path,
-                          capture_output=True, timeout=60)
+def test_latex_takes_the_documents_and_no_line_is_too_long(tmp_path):
+    begin, end = r'\begin{document}', r'\end{document}'
+    bodies = []
+    for case, form in product(OF_EACH_KIND, FORMS):
+        head, _, body = latex(case, form).partition(begin)
+        bodies.append(body.partition(end)[0])
+    (tmp_path / 'e.tex').write_text(f'{head}{begin}{"".join(bodies)}{end}')
+    done = subprocess.run(['pdflatex', '-draftmode', '-interaction=nonstopmode', 'e.tex'],
+                          cwd=tmp_path, capture_output=True, timeout=60)
     assert done.returncode == 0
     assert 'Overfull' not in (tmp_path / 'e.log').read_text(encoding='latin-1')
 

@@ -25,18 +25,25 @@ def test_the_text_names_chains_versions_axes_joints_and_tip_frames():
 def test_json_holds_the_same():
     listed = json.loads(run_main('list', '--json').stdout)
     assert set(listed) == {'file', 'chains'}
-    chains = {chain['name']: chain for chain in listed['chains']}
-    assert list(chains) == ['left_leg', 'right_leg', 'head_imu']
-    left = chains['left_leg']
+    left, right, head = listed['chains']
+    assert (left['name'], right['name'], head['name']) == ('left_leg', 'right_leg', 'head_imu')
     assert set(left) == {'name', 'tip', 'root_frame', 'joints', 'tip_frames', 'versions'}
     assert left['tip_frames'] == {'dh': 'l_foot_dh_frame', 'sole': 'l_sole'}
     assert left['joints'][3] == 'l_knee' and len(left['joints']) == 6
-    v1, v2_5, v3 = left['versions']
-    assert [version['name'] for version in (v1, v2_5, v3)] == ['v1', 'v2_5', 'v3']
-    assert [version['default'] for version in (v1, v2_5, v3)] == [False, True, False]
-    assert [bool(version['source']) for version in (v1, v2_5, v3)] == [False, False, True]
-    assert v2_5['root_axes'] == ['backward', 'right', 'up']
-    assert v3['root_axes'] == ['forward', 'left', 'up']
+
+
+@pytest.mark.parametrize(('index', 'name', 'is_default', 'root_axes'), [
+    (0, 'v1', False, ['backward', 'right', 'up']),
+    (1, 'v2_5', True, ['backward', 'right', 'up']),
+    (2, 'v3', False, ['forward', 'left', 'up']),
+])
+def test_json_describes_each_version(index, name, is_default, root_axes):
+    left = json.loads(run_main('list', '--json').stdout)['chains'][0]
+    assert len(left['versions']) == 3
+    version = left['versions'][index]
+    assert (version['name'], version['default']) == (name, is_default)
+    assert bool(version['source']) == (name == 'v3')
+    assert version['root_axes'] == root_axes
 
 
 def test_a_file_of_ones_own_is_listed():

@@ -64,7 +64,7 @@ def own_file(tmp_path):
     return write
 
 
-def largest_difference(urdf, chain, configurations=1000):
+def largest_difference(urdf, chain, configurations=200):
     """Compare Pinocchio's pose of the tip frame with ours, over random configurations."""
     pin = pytest.importorskip('pinocchio')
     model = pin.buildModelFromXML(urdf, mimic=True)

@@ -284,7 +284,7 @@ def test_a_small_file_that_says_very_much_by_aliases_is_refused(tmp_path: Path) 
     assert (error.found, error.allowed) == ('too many rows', 'at most 10000 in a file')
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(st.data())
 def test_a_damaged_file_is_read_or_refused_in_one_line(data: st.DataObject) -> None:
     """Cut pieces out, put others in: nothing but a catalog or one line comes of it."""

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support.oracle import CASES, HandMadeArm, PinocchioArm, quaternion_to_matrix, TABLES
 
-CONFIGURATIONS = 1000
+CONFIGURATIONS = 400
 TOLERANCE = 1e-12
 
 CATALOG = Catalog.load()
@@ -54,7 +54,7 @@ def test_poses_are_the_oracles(name: str, version: str, frame: str, oracle: Any)
 def test_jacobians_are_pinocchios(name: str, version: str, frame: str) -> None:
     pytest.importorskip('pinocchio')
     arm, chain = PinocchioArm(name, version, frame), CATALOG.chain(name, version, frame)
-    for q in random_configurations(chain, seed=2)[::10]:
+    for q in random_configurations(chain, seed=2)[::8]:
         assert np.abs(chain.jacobian(q) - arm.jacobian(q)).max() < TOLERANCE
 
 
@@ -62,7 +62,7 @@ def test_jacobians_are_pinocchios(name: str, version: str, frame: str) -> None:
 def test_twists_are_pinocchios(name: str, version: str, frame: str) -> None:
     pin = pytest.importorskip('pinocchio')
     arm, chain = PinocchioArm(name, version, frame), CATALOG.chain(name, version, frame)
-    for q, qdot in np.random.default_rng(3).uniform(-3, 3, (200, 2, chain.n)):
+    for q, qdot in np.random.default_rng(3).uniform(-3, 3, (50, 2, chain.n)):
         pin.forwardKinematics(arm.model, arm.data, q, qdot)
         pin.updateFramePlacements(arm.model, arm.data)
         expected = pin.getFrameVelocity(arm.model, arm.data, arm.tip,

@@ -192,22 +192,22 @@ def stop_after(delay, signals):
         node.stop(*signals)
 
 
-@pytest.mark.parametrize('signals', [[INT, INT], [TERM], [INT, TERM]],
+@pytest.mark.parametrize('signals', [[INT, INT], [TERM]],
                          ids=lambda signals: '+'.join(number.name for number in signals))
 def test_signals_at_any_moment_end_it_well(signals):
-    delays = [0.0, 0.05, 0.15, 0.3, 0.5]
+    delays = [0.0, 0.1, 0.25, 0.5]
     with ThreadPoolExecutor(4) as pool:  # more than there are processors: under load
         list(pool.map(stop_after, delays, [signals] * len(delays)))
 
 
-@pytest.mark.parametrize('pause', [0.0, 0.01, 0.1])
-def test_second_signal_while_it_is_going_down_changes_nothing(pause):
+@pytest.mark.parametrize('pause', [0.0, 0.05])
+def test_another_signal_while_it_is_going_down_changes_nothing(pause):
     with NodeProcess() as node:
         node.wait_for_log('publishing')
         node.process.send_signal(INT)
         time.sleep(pause)  # again the moment under test; the node may be gone by then
         if node.process.poll() is None:
-            node.process.send_signal(INT)
+            node.process.send_signal(TERM)
         node.check_end(0)
 
 

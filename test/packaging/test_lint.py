@@ -14,6 +14,8 @@ WORKFLOWS = sorted(map(str, ROOT.glob('.github/workflows/*.yml')))
 
 @pytest.mark.parametrize('command', [
     pytest.param(['ruff', 'check', '--no-fix', '.'], id='ruff'),
+    pytest.param(['ruff', 'check', '--no-fix', '--preview', '--select=E1,E2,E3', '.'],
+                 id='ruff, spaces and blank lines'),
     pytest.param(['mypy'], id='mypy --strict'),
     pytest.param(
         ['check_jsonschema', '--builtin-schema', 'vendor.github-workflows', *WORKFLOWS],

@@ -151,8 +151,8 @@ def test_an_editable_install_is_found_and_typed_in_the_parent_of_the_clone(
     script = clone.parent / 'walk.py'
     script.write_text(USER_SCRIPT)
     run(python, '-c', 'from icub_leg_fk import load_chain', cwd=clone.parent)
-    run(sys.executable, '-m', 'mypy', '--strict', '--python-executable', python, script,
-        cwd=clone.parent)
+    run(sys.executable, '-m', 'mypy', '--strict', '--python-executable', python,
+        '--cache-dir', ROOT / '.mypy_cache/of_a_user', script, cwd=clone.parent)
 
 
 @pytest.fixture(scope='module', params=[(), ('--symlink-install',)], ids=' '.join)

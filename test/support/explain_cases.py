@@ -6,9 +6,12 @@ from io import StringIO
 import json
 from pathlib import Path
 from typing import NamedTuple
+from unittest.mock import patch
 
 from icub_leg_fk.__main__ import main
+from icub_leg_fk.commands import explain as command
 from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.tools.explanation import explain as work_out
 import numpy as np
 import pytest
 
@@ -22,9 +25,19 @@ def explain(*words):
     return _explain(*map(str, words))
 
 
-@cache  # formulas take seconds
+# Formulas take seconds, so each is worked out once, whatever forms of it are printed.
+@cache
+def _worked_out(chain, q, exact):
+    return work_out(chain, q, exact=exact)
+
+
+def _worked_out_once(chain, q, *, exact):
+    return _worked_out(chain, None if q is None else tuple(q), exact)
+
+
+@cache
 def _explain(*words):
-    with redirect_stdout(StringIO()) as output:
+    with patch.object(command, 'explain', _worked_out_once), redirect_stdout(StringIO()) as output:
         assert main(['explain', *words]) == 0
     return output.getvalue()
 

@@ -90,14 +90,19 @@ class Trial:
             assert of_chain.chain is chain
             assert (of_chain.ready, of_chain.silent) == (model.ready[name], model.silent[name])
             assert of_chain.held_back == model.held_back[name]
-            concerned = set()
-            for reason in of_chain.joints.keys() - {'looks_like_degrees'}:
-                concerned |= {(reason, joint) for joint in of_chain.joints[reason]}
-            assert concerned == model.concerned[name]
-            assert self.input.held_stamps(chain) == {
-                joint: model.held[joint].stamp for joint in model.chains[name]
-                if joint in model.held}
+            assert concerned_joints(of_chain) == model.concerned[name]
+            held = {joint: model.held[joint].stamp
+                    for joint in model.held.keys() & set(model.chains[name])}
+            assert self.input.held_stamps(chain) == held
         model.count_anew()
+
+
+def concerned_joints(of_chain):
+    """Return the reasons of which the rules know, each with a joint it concerns."""
+    concerned = set()
+    for reason in of_chain.joints.keys() - {'looks_like_degrees'}:
+        concerned |= {(reason, joint) for joint in of_chain.joints[reason]}
+    return concerned
 
 
 @dataclass(frozen=True)
@@ -205,7 +210,7 @@ def contents(publisher, number, step):
     positions = values(number, n + publisher.surplus)
     velocities = values(number, int(n * publisher.velocities))
     efforts = values(number, int(n * publisher.efforts))
-    at = step.at % n if n else 0
+    at = step.at % max(n, 1)
     if step.fault == 'position' and n:
         positions[at] = step.value
     elif step.fault == 'velocity' and velocities:

@@ -66,8 +66,9 @@ class NodeProcess:
     def __init__(self, parameters=None, arguments=(), namespace=None, events_executor=True,
                  environment=None):
         self.namespace = f'/robot_{next(_numbers)}' if namespace is None else namespace
-        program = (['-m', 'icub_leg_fk.node.main'] if events_executor
-                   else ['-c', _WITHOUT_EVENTS_EXECUTOR])
+        program = ['-m', 'icub_leg_fk.node.main']
+        if not events_executor:
+            program = ['-c', _WITHOUT_EVENTS_EXECUTOR]
         command = [sys.executable, *program, '--ros-args', '-r', f'__ns:={self.namespace or "/"}',
                    *arguments]
         for name, value in (parameters or {}).items():
