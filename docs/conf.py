@@ -12,6 +12,7 @@ extensions = ['myst_parser', 'sphinx.ext.autodoc', 'sphinx.ext.napoleon']
 myst_heading_anchors = 3
 autodoc_member_order = 'bysource'
 autodoc_typehints = 'description'
+autodoc_typehints_description_target = 'documented'
 exclude_patterns = ['_build']
 html_theme = 'alabaster'
 html_theme_options = {

@@ -19,7 +19,7 @@ PAGES = {path.name: path.read_text() for path in (
     ROOT / 'docs/index.rst', *sorted((ROOT / 'docs').glob('*.md')))}
 README = PAGES['README.md']
 LEG_FK = re.compile(r'(?:ros2 run icub_leg_fk |.*python -m icub_)?leg_fk (.*?)(?: > .*)?$')
-NEEDS_ROS = re.compile(r'ros2 |rosdep |colcon |\. install|python3 -m venv|~/')
+NEEDS_ROS = re.compile(r'.*\bros2 |rosdep |colcon |\. install|python3 -m venv|~/')
 
 
 def blocks(text: str, kind: str) -> list[str]:
@@ -33,6 +33,12 @@ def commands(text: str) -> list[str]:
 
 def test_the_readme_can_be_read_in_ten_minutes():
     assert len(README.split()) <= 1000
+
+
+@pytest.mark.parametrize('page', PAGES)
+def test_no_line_of_code_is_cut_off(page):
+    for block in blocks(PAGES[page], '[a-z]+'):
+        assert max(map(len, block.splitlines())) <= 115
 
 
 def test_the_front_page_shows_commands_of_the_readme():
