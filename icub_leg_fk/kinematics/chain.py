@@ -140,12 +140,12 @@ class Chain(Frozen):
 
     @cached_property
     def lower(self) -> Array:
-        """(n,) smallest joint positions [rad or m]: the robots' if known, else as printed."""
+        """(n,) smallest joint positions [rad or m]; the robots' if known, else as printed."""
         return _read_only([link.limits[0] for link in self.joints])
 
     @cached_property
     def upper(self) -> Array:
-        """(n,) largest joint positions [rad or m]: the robots' if known, else as printed."""
+        """(n,) largest joint positions [rad or m]; the robots' if known, else as printed."""
         return _read_only([link.limits[1] for link in self.joints])
 
     def rows(self) -> tuple[Row, ...]:
