@@ -37,14 +37,14 @@ _REACH = 1.2  # rad or m
 _NEAR = 1.0  # mm or deg; so near a table is the robot
 _USABLE = 10.0  # mm
 _WIDTH = 80
-_FEWEST_JOINTS = 3  # for constants at both ends to be told from the joints
+_FEWEST_JOINTS = 3  # for constants at both ends to be distinguished from the joints
 _NODE = 'ros2 run icub_leg_fk foot_pose_publisher --ros-args'
 _HEADER = ('chain', 'version', 'frame', 'mm', 'deg', 'fit mm', 'fit deg', '')
 _NUMBERS = range(3, 7)  # the columns of numbers
 
 
 class Comparison(NamedTuple):
-    """A table's tip beside a robot's frame of that name.
+    """A table's tip compared with a robot's frame of that name.
 
     Attributes:
         chain: the table, in the frame that is compared.
@@ -100,7 +100,7 @@ def run(args: argparse.Namespace) -> int:
         print(text.as_json({'urdf': args.urdf, 'robot': urdf.name, 'advice': advice,
                             'differences': differences}))
         return 0
-    print(f'{args.urdf} ({urdf.name}) beside the tables of')
+    print(f'{args.urdf} ({urdf.name}) compared with the tables of')
     print(f'{catalog.file}')
     print(f'{_SAMPLES} postures within +-{_REACH} rad; largest difference\n')
     print('\n'.join(_table([_cells(row, row in nearest) for row in found])))

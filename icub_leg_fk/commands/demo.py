@@ -28,9 +28,9 @@ import numpy as np
 EXAMPLES = """\
 Starts the node foot_pose_publisher in its own process, plays a synthetic walking gait, or a
 recording, to it over DDS, shows the poses of both feet as they arrive, and at the end draws them.
-It talks inside this machine only, in a namespace of its own, and in a ROS_DOMAIN_ID of its own
-unless you have set one: no robot is disturbed. Exit status 0 if every pose arrived. A recording
-is a CSV file with a column `time` in seconds and one per leg joint, in radians.
+It talks inside this machine only, in its own namespace, and in its own ROS_DOMAIN_ID unless
+you have set one: no robot is disturbed. Exit status 0 if every pose arrived. A recording is a CSV
+file with a column `time` in seconds and one per leg joint, in radians.
 
 examples:
   leg_fk demo

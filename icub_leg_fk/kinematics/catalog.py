@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from codecs import BOM_UTF8, BOM_UTF16_LE
+import codecs
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
@@ -28,7 +28,7 @@ from icub_leg_fk.kinematics.yaml_fields import MAX_BYTES
 PACKAGE = 'icub_leg_fk'
 SHIPPED_FILE = 'icub_kinematics.yaml'
 
-_BEFORE_TEXT = b' \t\r\n\0' + BOM_UTF8 + BOM_UTF16_LE
+_BEFORE_TEXT = b' \t\r\n\0' + codecs.BOM_UTF8 + codecs.BOM_UTF16_LE
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -80,7 +80,8 @@ class Catalog(Frozen):
             tolerance: angle up to which the tables are tidied for people [rad]; 0 for exact ones.
 
         Raises:
-            InputFileError: no root is given, and the URDF has none of its own.
+            InputFileError: no root is given, and the URDF has no `root_link` and not just one link
+                at the top.
             UnknownNameError: the URDF has no such root link.
         """
         start = root or urdf.root()
@@ -221,7 +222,7 @@ def load_chain(name: str, version: str | None = None, *, frame: str | None = Non
 def config_file(name: str) -> Path:
     """Return the path of a shipped configuration file, however the package was installed.
 
-    Looks beside the sources (a checkout or an editable install), then in `share/icub_leg_fk` of
+    Looks next to the sources (a checkout or an editable install), then in `share/icub_leg_fk` of
     the prefix the package was installed to (colcon, a Debian package, pip).
 
     Raises:

@@ -85,7 +85,7 @@ class Chain(Frozen):
         convention: `standard`, or `modified` for a table in Craig's convention.
         root_axes: where x, y and z of the root point, such as backward, right, up; empty if it is
             not known.
-        source: where the table comes from; empty if nothing is said.
+        source: where the table comes from; empty if not given.
     """
 
     name: str
@@ -172,7 +172,7 @@ class Chain(Frozen):
             (..., 4, 4) transforms.
 
         Raises:
-            JointVectorError: q is not (..., n), an entry is no finite number, or a joint is
+            JointVectorError: q is not (..., n), an entry is not finite, or a joint is
                 missing.
         """
         positions = joint_array(q, self.joint_names)
@@ -192,7 +192,7 @@ class Chain(Frozen):
             (..., m + 2, 4, 4): frame 0, a frame for each of the m rows, and the tip's.
 
         Raises:
-            JointVectorError: q is not (..., n), an entry is no finite number, or a joint is
+            JointVectorError: q is not (..., n), an entry is not finite, or a joint is
                 missing.
         """
         positions = joint_array(q, self.joint_names)
@@ -230,7 +230,7 @@ class Chain(Frozen):
                 fastest.
 
         Raises:
-            JointVectorError: q has not n entries, or one is no finite number, or a joint is
+            JointVectorError: q has not n entries, or one is not finite, or a joint is
                 missing.
         """
         try:
@@ -253,7 +253,7 @@ class Chain(Frozen):
             (N, 7) rows x, y, z [m], qx, qy, qz, qw.
 
         Raises:
-            JointVectorError: Q is not (N, n), an entry is no finite number, or a joint is
+            JointVectorError: Q is not (N, n), an entry is not finite, or a joint is
                 missing.
         """
         return _finite(self._solver.poses(joint_array(Q, self.joint_names, 2)))
@@ -273,7 +273,7 @@ class Chain(Frozen):
             of joint velocity.
 
         Raises:
-            JointVectorError: q has not n entries, or one is no finite number, or a joint is
+            JointVectorError: q has not n entries, or one is not finite, or a joint is
                 missing.
         """
         positions = joint_array(q, self.joint_names, 1)
@@ -300,7 +300,7 @@ class Chain(Frozen):
             qdot: (n,) joint velocities [rad/s or m/s]; likewise.
 
         Raises:
-            JointVectorError: q or qdot has not n entries, or one is no finite number, or a joint
+            JointVectorError: q or qdot has not n entries, or one is not finite, or a joint
                 is missing.
         """
         try:
@@ -321,7 +321,7 @@ class Chain(Frozen):
             q: (n,) joint positions [rad or m], or a mapping from joint names.
 
         Raises:
-            JointVectorError: q has not n entries, or one is no finite number, or a joint is
+            JointVectorError: q has not n entries, or one is not finite, or a joint is
                 missing.
         """
         positions = joint_array(q, self.joint_names, 1)

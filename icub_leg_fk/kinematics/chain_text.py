@@ -16,7 +16,7 @@ HEADER = ('i', 'joint', 'a', 'd', 'alpha', 'theta', 'range')
 
 
 def short(value: float, decimals: int = 4) -> str:
-    """Return a number with at most so many decimals: 0.5, -1, 17.3205; never -0."""
+    """Return a rounded number without zeros at its end: 0.5, -1, 17.3205; never -0."""
     text = f'{round(value, decimals) + 0.0:.{decimals}f}'
     return text.rstrip('0').rstrip('.') if '.' in text else text
 

@@ -26,7 +26,7 @@ def joint_floats(q: JointVector, joint_names: Sequence[str], name: str = 'q') ->
 
     Raises:
         JointVectorError: q has not n entries, or lacks a joint.
-        ArithmeticError, TypeError, ValueError: an entry of a list or tuple is no number;
+        ArithmeticError, TypeError, ValueError: an entry of a list or tuple is not a number;
             `joint_array` says which.
     """
     if type(q) is list or type(q) is tuple:
@@ -46,7 +46,7 @@ def joint_array(q: ArrayLike | Mapping[str, ArrayLike], joint_names: Sequence[st
         name: what q is called in an error.
 
     Raises:
-        JointVectorError: q has another shape, lacks a joint, or an entry is no finite number.
+        JointVectorError: q has another shape, lacks a joint, or an entry is not finite.
     """
     n = len(joint_names)
     allowed = f'{_SHAPES[ndim].format(n=n)} finite real numbers, one per joint'
@@ -81,7 +81,7 @@ def _values(q: ArrayLike, name: str, allowed: str) -> Array:
     try:
         values = np.asarray(q)
     except (OverflowError, TypeError, ValueError) as error:
-        fault = f'is {_type_in_words(q)} of values that are no numbers, or too few or too many'
+        fault = f'is {_type_in_words(q)} whose parts differ in length, or are not numbers'
         raise JointVectorError(name, fault, allowed) from error
     is_masked = type(q).__module__.startswith('numpy.ma')  # whose import takes a start 7 ms
     is_number = values.dtype.kind in 'biuf' or not values.size

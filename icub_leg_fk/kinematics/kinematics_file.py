@@ -112,7 +112,7 @@ class _Reader:
             owner = owners.setdefault(entry.tip, name)
             if owner != name:
                 tip = chains[name].at('field tip')
-                tip.fail('a tip of its own', f'{entry.tip}, the tip of chain {owner}')
+                tip.fail('another tip for each chain', f'{entry.tip}, the tip of chain {owner}')
 
     def _check_default(self, top: Mapping[str, Field], entries: Mapping[str, ChainEntry]) -> None:
         """Refuse a default version that no chain has."""

@@ -141,7 +141,7 @@ def standard_rows(rows: Sequence[DHLink]) -> tuple[DHLink, ...]:
 
     There A_i = Rx(alpha) Tx(a) Rz(theta) Tz(d), with a and alpha before the joint instead of
     after it. So each standard row takes them from the next one, and those of the first become a
-    fixed row of their own, if they are not 0.
+    fixed row that has only them, if they are not 0.
     """
     links = []
     for row, following in zip(rows, [*rows[1:], None], strict=True):

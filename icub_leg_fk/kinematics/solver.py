@@ -85,8 +85,8 @@ def _short_repr(numbers: Pose | Twist) -> str:
 class Solver:
     """Position, unit quaternion and velocity of a chain's tip in its root frame.
 
-    Joint vectors are taken as they are: what is no finite number gives no finite result, or the
-    ValueError of `math.cos`.
+    Joint vectors are taken as they are: what is not finite gives a result that is not finite, or
+    the ValueError of `math.cos`.
 
     Args:
         links: m rows, root to tip.

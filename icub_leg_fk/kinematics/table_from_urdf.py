@@ -34,7 +34,7 @@ TIDY = 1e-4  # rad; a tolerance that tidies the tables of real robots for people
 _EXACT = 1e-11  # rad and m; below it a number is rounding
 _SHORT = 1e-8  # m; what is shorter is 0 in a tidied table
 _NEARLY = 0.2  # rad; between axes that are this near a common normal may be far away
-_FAR = 1.0  # m along an axis, beside five times the distance of the joints
+_FAR = 1.0  # m along an axis, added to five times the distance of the joints
 
 
 def chain_from_urdf(urdf: Urdf, root: str, tip: str, *, tolerance: float = 0.0) -> Chain:
@@ -45,7 +45,7 @@ def chain_from_urdf(urdf: Urdf, root: str, tip: str, *, tolerance: float = 0.0) 
     Args:
         urdf: the robot.
         root: name of the link to start from.
-        tip: name of a link below it, or beside it with fixed joints on the way up.
+        tip: name of a link below it, or one reached by going up over fixed joints first.
         tolerance: angle up to which axes are taken as parallel, and angles as right ones [rad].
 
     Raises:

@@ -293,7 +293,7 @@ class Urdf:
             self._fail(f'the joint from {joint.parent!r} to {joint.child!r} has no name')
         for name in (joint.name, joint.parent, joint.child):
             if REPLACEMENT in name:
-                self._fail(f'the name {name!r} has a byte that is no text')
+                self._fail(f'the name {name!r} has a byte that is not UTF-8 text')
         origin = self._origin(joint)
         if joint.kind == 'fixed':
             return UrdfJoint(joint.name, joint.kind, origin, np.zeros(3))

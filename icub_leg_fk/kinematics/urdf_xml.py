@@ -17,7 +17,7 @@ from lxml import etree
 import yaml
 
 REPLACEMENT = '\N{REPLACEMENT CHARACTER}'
-"""What stands where a byte is no text; a name that has it cannot be used."""
+"""What stands where a byte is not UTF-8 text; a name that has it cannot be used."""
 
 _CUT_OFF = 140  # characters; `ros2 topic echo` prints 128 of a text, and three points
 
@@ -37,7 +37,7 @@ def robot_element(data: bytes, file: str) -> etree._Element:
         file: what it is called in an error.
 
     Raises:
-        InputFileError: it is no URDF, or its XML is malformed in a way that is not forgiven.
+        InputFileError: it is not a URDF, or its XML is malformed in a way that is not forgiven.
     """
     text = _text(data, file)
     parser = etree.XMLParser(recover=True, resolve_entities=False, no_network=True,

@@ -123,7 +123,7 @@ class Field:
         return fields
 
     def items(self, content: str, length: int | None = None) -> Iterator[Field]:
-        """Yield the items of a list, at least one, or so many."""
+        """Yield the items of a list, which has at least one, or exactly `length`."""
         if not isinstance(self.node, yaml.SequenceNode):
             self.fail(content)
         count = len(self.node.value)
@@ -191,9 +191,9 @@ def read_yaml(path: str | Path) -> Field:
         _fail(file, 0, f'more than {MAX_BYTES} bytes', f'at most {MAX_BYTES} bytes')
     try:
         node = yaml.compose(data, Loader=Loader)
-    except yaml.reader.ReaderError as error:  # bytes that are no text, or no printable text
+    except yaml.reader.ReaderError as error:  # bytes that are not text, or not printable
         line = data.count(b'\n', 0, error.position) + 1
-        _fail(file, line, f'a byte or character that is no printable UTF-8 text ({error.reason})',
+        _fail(file, line, f'a byte or character that is not printable UTF-8 text ({error.reason})',
               'UTF-8 text')
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark

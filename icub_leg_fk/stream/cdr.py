@@ -213,6 +213,6 @@ def _string(text: str) -> bytes:
     return struct.pack('<I', len(data)) + data
 
 
-def _aligned(before: int, data: bytes, size: int) -> bytes:
-    """Return data that starts after so many bytes, padded for items of a size to follow."""
-    return data + bytes(-(before + len(data)) % size)
+def _aligned(offset: int, data: bytes, size: int) -> bytes:
+    """Return data that starts at an offset, padded so that items of `size` may follow."""
+    return data + bytes(-(offset + len(data)) % size)

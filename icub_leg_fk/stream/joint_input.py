@@ -4,7 +4,7 @@ The rules:
 
 - Joints are matched by name; joints of no chain are ignored.
 - A message that brings some of a chain's joints updates those. The chain is then ready if each of
-  its joints is known, finite and no older than the joint timeout beside the newest of them.
+  its joints is known, finite and lags the newest of them by no more than the joint timeout.
   (Finite is what leaves room to compute with: less than `LARGEST_VALUE`.)
 - A message is rejected as a whole if `position` is not as long as `name`, or a name appears twice;
   an empty `position` is counted only. Velocities are unknown unless they are as many as the names.

@@ -37,7 +37,7 @@ class JointStateReader:
         """Return the form of a message: remembered, or read anew.
 
         Raises:
-            MalformedMessageError: the bytes are no JointState.
+            MalformedMessageError: the bytes are not a JointState.
         """
         for form in self._forms:
             if form.fits(data):

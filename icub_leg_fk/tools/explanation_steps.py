@@ -81,7 +81,7 @@ class Equation:
 
 @dataclass(frozen=True)
 class Entries:
-    """A name, and a transform that is too wide for a line; its entries are told one by one."""
+    """A name, and a transform that is too wide for a line; its entries are given one by one."""
 
     name: str
     T: Matrix

@@ -17,7 +17,7 @@ def kinematics_file_text(chains: Sequence[Chain], comments: Sequence[str]) -> st
     """Return chains as a kinematics file.
 
     Args:
-        chains: the chains, each with a name of its own.
+        chains: the chains, with different names.
         comments: what stands at the top, a line each.
     """
     lines = [f'# {comment}' for comment in comments]
@@ -81,7 +81,7 @@ def _row_lines(rows: Sequence[Row]) -> list[str]:
 
 
 def _more(row: Row) -> str:
-    """Return what a row has beside its four numbers."""
+    """Return what a row has besides its four numbers."""
     link = row.link
     more = ''
     if row.is_first and link.has_limits:

@@ -212,8 +212,8 @@ _OPTIONS: dict[str, dict[str, Any]] = {
         'help': 'print JSON, for programs'},
     '--kinematics-file': {
         'metavar': 'FILE',
-        'help': "a kinematics file, with the DH tables of any robot, or a URDF (default: the "
-                "iCub's tables, as shipped)"},
+        'help': 'a kinematics file, with the DH tables of any robot, or a URDF (default: the '
+                'tables of the iCub, as shipped)'},
     '--root': {
         'metavar': 'LINK',
         'help': 'of a URDF, the link that poses are given in (default: root_link, or the top of '

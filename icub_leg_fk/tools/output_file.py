@@ -20,7 +20,7 @@ def whole_path(path: str | Path, *, force: bool,
                may_replace: Callable[[Path], bool] = Path.is_file) -> Iterator[Path]:
     """Give a path to make a file or directory at; it takes its place when the block ends well.
 
-    The work is done in a hidden directory beside the target, of which nothing is left. A target
+    The work is done in a hidden directory next to the target, which is removed. A target
     that exists is replaced if that is forced, and `may_replace` says that it is of the kind.
 
     Raises:

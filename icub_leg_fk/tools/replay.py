@@ -1,4 +1,4 @@
-"""The demonstration's session: the node in a process of its own, joint states out, poses back."""
+"""The demonstration's session: the node in its own process, joint states out, poses back."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -77,9 +77,9 @@ def lossless(namespace: str, tips: Iterable[str], depth: int) -> dict[str, str]:
 def running_node(namespace: str, parameters: Mapping[str, str],
                  program: Sequence[str] = ('icub_leg_fk.node.main',), own_session: bool = True
                  ) -> Iterator[tuple[subprocess.Popen[bytes], Callable[[], None]]]:
-    """Run `foot_pose_publisher`, or another module, in a process of its own.
+    """Run `foot_pose_publisher`, or another module, in its own process.
 
-    In a session of its own Ctrl-C does not reach it. Gives the process, and what raises
+    In its own session Ctrl-C does not reach it. Gives the process, and what raises
     `DemoError` once it has stopped by itself.
     """
     command = [sys.executable, '-m', *program, '--ros-args', '-r', f'__ns:={namespace}']
@@ -163,7 +163,7 @@ class Replay:
     def wait_for_node(self, check: Callable[[], None]) -> None:
         """Send messages, which do not count, until each tip has answered one.
 
-        `check` is called again and again, and raises if there is no hope.
+        `check` is called again and again, and raises if the node has ended.
         """
         deadline = time.monotonic() + _DISCOVERY_TIMEOUT
         while len(self._found) < len(self.answers):
@@ -179,7 +179,7 @@ class Replay:
         """Publish every message at its time and wait for the poses.
 
         Every `period` seconds, `on_time` is called with the time since the first message [s], and
-        `check`, which raises if there is no hope.
+        `check`, which raises if the node has ended.
         """
         offsets = (self._recording.times - self._recording.times[0]).tolist()
         start, start_ns = time.monotonic(), time.time_ns()

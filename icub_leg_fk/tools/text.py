@@ -16,7 +16,7 @@ _INNERMOST_LIST = re.compile(r'\[\n\s*([^][{}]*?)\n\s*\]')
 
 
 def fixed(value: float, decimals: int) -> str:
-    """Return a number with exactly so many decimals, and without a negative zero."""
+    """Return a number with a fixed number of decimals, without a negative zero."""
     return f'{round(value, decimals) + 0.0:.{decimals}f}'
 
 

@@ -2,7 +2,7 @@
 
 The URDF link after joint i is frame i turned (or slid) by the joint alone, so the rest of the DH
 link, A_i at q = 0, becomes the fixed origin of the next joint. Every joint moves along its z. A
-row that follows the joint of another row is a joint of its own, which mimics that one.
+row that follows the joint of another row is another joint, which mimics that one.
 """
 
 from collections import Counter

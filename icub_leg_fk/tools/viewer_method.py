@@ -105,7 +105,7 @@ class Method:
         return scene
 
     def lines(self, step: int, row: int) -> list[str]:
-        """Return what is said at a step, 1 to 6; at step 5 of one row."""
+        """Return the words for a step, 1 to 6; at step 5 of one row."""
         frames = range(len(self.frames))
         if step == 1:
             return self._vectors('z', 2, [self._axis_words(i) for i in frames])
@@ -327,11 +327,11 @@ def _angle_scene(name: str, angle: float, center: Array, points: Array, color: s
     if abs(angle) < _NOTHING:
         return {}
     sides = np.stack((points[0], center, points[-1]))
-    beside = center + 1.25 * (points[len(points) // 2] - center)
+    label_place = center + 1.25 * (points[len(points) // 2] - center)
     words = f'{name} = {short(math.degrees(angle))} deg'
     return {f'method/{name}': polyline(points, color, 5.0),
             f'method/{name} sides': polyline(sides, color, 1.5),
-            f'method/{name} value': Label(words, beside)}
+            f'method/{name} value': Label(words, label_place)}
 
 
 def _sum(constant: float, total: float) -> str:

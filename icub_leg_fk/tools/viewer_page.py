@@ -133,7 +133,7 @@ class Canvas:
 
 
 def _look(part: Lines | Dots) -> tuple[Any, float]:
-    """Return what distinguishes parts beside their places."""
+    """Return what distinguishes parts other than their places."""
     return (part.colors, part.width) if isinstance(part, Lines) else (part.color, part.size)
 
 

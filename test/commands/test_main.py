@@ -110,7 +110,7 @@ FILES = {
 # What is typed, and words of the answer, whose exit status is 2.
 ANSWERS_ON_FILES = [
     ('list -k empty', 'found nothing, allowed: units and chains'),
-    ('list -k bytes', 'no printable UTF-8 text'),
+    ('list -k bytes', 'not printable UTF-8 text'),
     ('list -k text.txt', "found 'left_leg', allowed: a mapping with units"),
     ('list -k page.html', 'is not a URDF: its root is <html>'),
     ('list -k link.urdf', 'has no chain: no joint moves a link at its ends'),

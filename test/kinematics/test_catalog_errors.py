@@ -100,7 +100,7 @@ MISTAKES = {
                   'a list of joint names'),
     'two chains with one tip': (
         GOOD, GOOD + GOOD[GOOD.index('  leg:'):].replace('  leg:', '  arm:'), 26,
-        'chain arm, field tip', 'foot, the tip of chain leg', 'a tip of its own'),
+        'chain arm, field tip', 'foot, the tip of chain leg', 'another tip for each chain'),
     # --- tip frames
     'no tip frames': (GOOD[GOOD.index('      dh'):GOOD.index('    versions')], '      {}\n', 8,
                       f'{LEG}, field tip_frames', 'none', 'at least one tip frame'),
@@ -247,8 +247,8 @@ def test_a_mistake_reads_the_same_where_pyyaml_has_no_libyaml(
     (b'---\n', ':2', 'nothing', f'a mapping with {TOP}'),
     (b'left_leg', ':1', "'left_leg'", f'a mapping with {TOP}'),
     (b'- 1\n', ':1', 'a list', f'a mapping with {TOP}'),
-    (b'units:\n\n# caf\xe9', ':3', 'a byte or character that is no printable UTF-8 text', ''),
-    (b'a: 3\0', ':1', 'a byte or character that is no printable UTF-8 text', ''),
+    (b'units:\n\n# caf\xe9', ':3', 'a byte or character that is not printable UTF-8 text', ''),
+    (b'a: 3\0', ':1', 'a byte or character that is not printable UTF-8 text', ''),
     (b'a:\n\tb: 1\n', ':2', 'text that is not YAML (found character that cannot start', ''),
     (b'a: 1\n---\na: 2\n', ':2', 'text that is not YAML (but found another document)', ''),
     (b'#' * 1_000_001, '', 'more than 1000000 bytes', 'at most 1000000 bytes'),
