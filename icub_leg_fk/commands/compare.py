@@ -80,17 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the comparison."""
     catalog, urdf = options.load_catalog(args), Urdf.load(args.urdf)
-    found: list[Comparison] = []
-    not_compared: dict[str, str] = {}
-    for name in args.chains or catalog.chains:
-        rows, reason = _compare_chain(catalog, name, urdf)
-        found += rows
-        if not rows:
-            not_compared[name] = reason
-    if not found:
-        reasons = '; '.join(f'{name}: {reason}' for name, reason in not_compared.items())
-        raise InputFileError(args.urdf, f'cannot be compared: {reasons}; -k takes tables with the '
-                             'names of this robot')
+    found, not_compared = _compare_all(catalog, args.chains or list(catalog.chains), urdf)
     nearest = _nearest_of_each_chain(found)
     advice = [_summary(row, found) for row in nearest]
     advice += [f'{name}: not compared: {reason}' for name, reason in not_compared.items()]
@@ -109,6 +99,27 @@ def run(args: argparse.Namespace) -> int:
         is_command = line.startswith('  ')
         print(line if is_command else textwrap.fill(line, _WIDTH, subsequent_indent='  '))
     return 0
+
+
+def _compare_all(catalog: Catalog, names: Sequence[str], urdf: Urdf
+                 ) -> tuple[list[Comparison], dict[str, str]]:
+    """Return the comparisons of some chains, and why the others are not compared, by name.
+
+    Raises:
+        InputFileError: no chain can be compared.
+    """
+    found: list[Comparison] = []
+    not_compared: dict[str, str] = {}
+    for name in names:
+        rows, reason = _compare_chain(catalog, name, urdf)
+        found += rows
+        if not rows:
+            not_compared[name] = reason
+    if not found:
+        reasons = '; '.join(f'{name}: {reason}' for name, reason in not_compared.items())
+        raise InputFileError(urdf.file, f'cannot be compared: {reasons}; -k takes tables with the '
+                             'names of this robot')
+    return found, not_compared
 
 
 def _compare_chain(catalog: Catalog, name: str, urdf: Urdf) -> tuple[list[Comparison], str]:

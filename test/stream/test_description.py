@@ -51,6 +51,26 @@ BAD = {
 
 @given(st.lists(st.sampled_from([*GOOD, *BAD])))
 def test_the_last_that_can_be_used_is_used(names):
+    description, used = after(names)
+    good = [name for name in names if name in GOOD]
+    assert used == good
+    assert description.value('any chain') == (good[-1] if good else '')
+
+
+@given(st.lists(st.sampled_from([*GOOD, *BAD])))
+def test_one_that_cannot_be_used_is_an_error_until_another_one_comes(names):
+    description, used = after(names)
+    levels = [note.level for note in description.notes(['/robot_state_publisher'])]
+    if names and names[-1] in BAD:
+        assert levels == ['error']
+        stays = 'the one before stays' if used else 'nothing is published until another one comes'
+        assert texts(description)[0].endswith(f'; {stays}')
+    else:
+        assert levels == ([] if names else ['warning'])
+
+
+def after(names):
+    """Return a description to which some have come, and the names of those that were used."""
     used = []
 
     def use(urdf):
@@ -61,18 +81,7 @@ def test_the_last_that_can_be_used_is_used(names):
     for name in names:
         text = (GOOD | BAD)[name]
         description.take(b'' if text is None else string(text))
-    good = [name for name in names if name in GOOD]
-    assert used == good
-    assert description.value('any chain') == (good[-1] if good else '')
-    levels = [note.level for note in description.notes(['/robot_state_publisher'])]
-    if not names:
-        assert levels == ['warning']
-    elif names[-1] in BAD:
-        assert levels == ['error']
-        stays = 'the one before stays' if good else 'nothing is published until another one comes'
-        assert texts(description)[0].endswith(f'; {stays}')
-    else:
-        assert levels == []
+    return description, used
 
 
 @pytest.mark.parametrize('data', [b'', b'\0\1\0\0', string('x')[:-1], string('x' * 9)[:12]])
