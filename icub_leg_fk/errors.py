@@ -89,13 +89,13 @@ class InputFileError(LegFKError):
         fault: what is wrong with it.
     """
 
-    def __init__(self, file: str, fault: str = '') -> None:
+    def __init__(self, file: str, fault: str) -> None:
         self.file = file
         self.fault = fault
         super().__init__(file, fault)
 
     def __str__(self) -> str:
-        return f'{self.file}: {self.fault}' if self.fault else self.file
+        return f'{self.file}: {self.fault}'
 
 
 class CatalogError(InputFileError):
@@ -134,13 +134,13 @@ class OutputFileError(LegFKError):
         fault: what is wrong with it.
     """
 
-    def __init__(self, file: str, fault: str = '') -> None:
+    def __init__(self, file: str, fault: str) -> None:
         self.file = file
         self.fault = fault
         super().__init__(file, fault)
 
     def __str__(self) -> str:
-        return f'{self.file}: {self.fault}' if self.fault else self.file
+        return f'{self.file}: {self.fault}'
 
 
 class MalformedMessageError(LegFKError):
@@ -168,13 +168,13 @@ class ParameterError(LegFKError):
         fault: what is wrong with it, and what is allowed.
     """
 
-    def __init__(self, parameter: str, fault: str = '') -> None:
+    def __init__(self, parameter: str, fault: str) -> None:
         self.parameter = parameter
         self.fault = fault
         super().__init__(parameter, fault)
 
     def __str__(self) -> str:
-        return f'parameter {self.parameter}: {self.fault}' if self.fault else self.parameter
+        return f'parameter {self.parameter}: {self.fault}'
 
 
 class MissingDependencyError(LegFKError):
@@ -186,13 +186,11 @@ class MissingDependencyError(LegFKError):
         install: the line that installs it.
     """
 
-    def __init__(self, library: str, purpose: str = '', install: str = '') -> None:
+    def __init__(self, library: str, purpose: str, install: str) -> None:
         self.library = library
         self.purpose = purpose
         self.install = install
         super().__init__(library, purpose, install)
 
     def __str__(self) -> str:
-        if not self.purpose:
-            return self.library
         return f'{self.purpose} needs {self.library}, which is not installed: {self.install}'

@@ -85,8 +85,11 @@ def _version(entry: ChainEntry, version: str) -> str:
 
 def _joints(chain: Chain) -> list[str]:
     names = chain.joint_names
-    starts = range(0, chain.n, _JOINTS_IN_A_LINE)
-    return ['  '.join(names[start:start + _JOINTS_IN_A_LINE]) for start in starts]
+    lines = []
+    for start in range(0, chain.n, _JOINTS_IN_A_LINE):
+        end = start + _JOINTS_IN_A_LINE
+        lines.append('  '.join(names[start:end]))
+    return lines
 
 
 def _as_json(entry: ChainEntry) -> dict[str, Any]:

@@ -360,7 +360,8 @@ class Chain(Frozen):
         links, joints = self.links, self._row_joints
         if self.convention == 'modified':
             links = modified_rows(self.links)
-            joints = joints[len(joints) - len(links):]
+            first = len(joints) - len(links)
+            joints = joints[first:]
         rows = []
         for index, (link, joint) in enumerate(zip(links, joints, strict=True)):
             name = '' if link.is_fixed else self.joint_names[joint]

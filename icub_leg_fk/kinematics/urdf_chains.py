@@ -134,7 +134,9 @@ def doubts(urdf: Urdf) -> tuple[str, ...]:
     lines = []
     for found in joints_by_doubt.values():
         others = len(found) - 1
-        more = f' (and {others} more joint{"s" * (others != 1)} like this)' if others else ''
+        more = ''
+        if others:
+            more = f' (and {others} more joint{"s" * (others != 1)} like this)'
         lines.append(f'{urdf.file}: {found[0]}{more}')
     return tuple(lines)
 

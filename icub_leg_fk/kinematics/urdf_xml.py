@@ -76,7 +76,8 @@ def _text(data: bytes, file: str) -> str:
     text = _COMMENT.sub(lambda found: f'<!--{_newlines(found)}-->', text)
     declarations = _DECLARATIONS.match(text)
     if declarations:
-        text = _newlines(declarations) + text[declarations.end():]
+        end = declarations.end()
+        text = _newlines(declarations) + text[end:]
     _refuse_mark(text, '<?', 'a processing instruction', file)
     text = _NO_TEXT.sub(REPLACEMENT, text)
     text = _VALUE.sub(_with_its_newlines, text)

@@ -43,7 +43,9 @@ class FootPosePublisher(Node):
             qos_overriding_options=OVERRIDABLE)
         descriptions = self.create_subscription(
             String, 'robot_description', self._take_description, _DESCRIPTION_QOS, raw=True)
-        use = self._node_parameters.use if self._node_parameters.description_is_source else None
+        use = None
+        if self._node_parameters.description_is_source:
+            use = self._node_parameters.use
         self._description = Description(descriptions.topic_name, use)
         self._health = Health(self, self._input, self._joint_states.topic_name, self._description)
         self._apply(self._node_parameters.configuration)

@@ -191,7 +191,8 @@ class _Reader:
         """Return the string that follows, not decoded."""
         size = self.length(field, 1)
         start = self.take(field, size)
-        text = self._data[start:self._at]
+        end = self._at
+        text = self._data[start:end]
         if size and text.find(0) != size - 1:
             self._fail(f'{field} is not a string that ends with NUL')
         return text[:-1]

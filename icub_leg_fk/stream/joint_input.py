@@ -211,7 +211,9 @@ class JointInput:
                 state.look.silent += 1
                 continue
             state.look.ready += 1
-            qdot = self._velocities(state, brought, pick) if self._wants_velocities else None
+            qdot = None
+            if self._wants_velocities:
+                qdot = self._velocities(state, brought, pick)
             ready.append(Ready(state.chain, sec, nanosec, q, qdot))
         return ready
 

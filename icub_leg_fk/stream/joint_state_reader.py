@@ -97,11 +97,13 @@ class Form:
 
     def _remember_head(self, data: bytes, layout: JointStateLayout) -> None:
         """Remember what a message begins with, its padding masked."""
-        mask = bytearray(b'\xff' * layout.names_end)
+        names_end = layout.names_end
+        mask = bytearray(b'\xff' * names_end)
         for at, size in layout.padding:
-            mask[at:at + size] = bytes(size)
+            end = at + size
+            mask[at:end] = bytes(size)
         self._mask = int.from_bytes(mask[STAMP_END:], 'little')
-        self._head = data[STAMP_END:layout.names_end]
+        self._head = data[STAMP_END:names_end]
         self._masked_head = int.from_bytes(self._head, 'little') & self._mask
         self._encapsulation = data[:2]
 
@@ -139,7 +141,8 @@ class Form:
         """
         if len(data) < self._size:
             return False
-        head = data[STAMP_END:self.names_end]
+        end = self.names_end
+        head = data[STAMP_END:end]
         if int.from_bytes(head, 'little') & self._mask != self._masked_head:
             return False
         self._head = head

@@ -100,8 +100,8 @@ def _of_messages(look: Look, on_topic: str) -> Iterator[tuple[str, str]]:
     where = look.faults.get(TIME_JUMP)
     if jumps >= _MANY_JUMPS and jumps * _LOOP > look.messages:
         yield 'many_time_jumps', (
-            f'time stepped back {jumps} times in {look.messages} messages, last to {where}: do '
-            'several publishers bring the same joints?')
+            f'time stepped back {jumps} times in {look.messages} messages, last to {where}: '
+            'do several publishers bring the same joints?')
     elif jumps:
         times = f' {jumps} times, last' if jumps > 1 else ''
         yield TIME_JUMP, f'time stepped back{times} to {where}; held joints are forgotten'

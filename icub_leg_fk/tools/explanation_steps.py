@@ -179,7 +179,9 @@ def _motion(row: ExplainedRow) -> str:
     if row.link.is_fixed:
         return 'a fixed row'
     mover = row.row.joint if row.row.is_first else f'a row that follows {row.row.joint}'
-    return f'{mover} slides along it' if row.link.is_prismatic else f'{mover} turns about it'
+    if row.link.is_prismatic:
+        return f'{mover} slides along it'
+    return f'{mover} turns about it'
 
 
 def _joint(row: Row) -> str:

@@ -176,7 +176,8 @@ class Method:
 
     def _row_scene(self, row: int) -> Scene:
         """Return theta, d, a and alpha of a row, and the frames between which they lead."""
-        geometry, pair = self.geometry(row), self.frames[row:row + 2]
+        geometry = self.geometry(row)
+        pair = np.stack((self.frames[row], self.frames[row + 1]))
         length = 0.2 * self._size
         tips = pair[:, :3, 3, None] + 1.08 * length * pair[:, :3, :3]
         names = [f'{axis}_{i}' for i in (row, row + 1) for axis in 'xyz']

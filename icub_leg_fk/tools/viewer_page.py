@@ -134,7 +134,9 @@ class Canvas:
 
 def _look(part: Lines | Dots) -> tuple[Any, float]:
     """Return what distinguishes parts other than their places."""
-    return (part.colors, part.width) if isinstance(part, Lines) else (part.color, part.size)
+    if isinstance(part, Lines):
+        return part.colors, part.width
+    return part.color, part.size
 
 
 def _rgb(color: str) -> tuple[int, int, int]:
@@ -230,7 +232,9 @@ def slider_start(link: DHLink) -> float:
 def _shown_limits(link: DHLink) -> tuple[float, float]:
     """Return the ends of a joint's range [deg or m]."""
     lower, upper = link.limits
-    return (lower, upper) if link.is_prismatic else (math.degrees(lower), math.degrees(upper))
+    if link.is_prismatic:
+        return lower, upper
+    return math.degrees(lower), math.degrees(upper)
 
 
 def _range_line(link: DHLink, position: float) -> str:

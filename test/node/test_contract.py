@@ -29,11 +29,10 @@ ANGLES = {name: 0.03 * (i + 1) * (-1) ** i for i, name in enumerate(BOTH)}
 BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 LATE = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 PARAMETERS = config_file('foot_pose_publisher.yaml')
+NODE = 'qos_overrides.{ns}/foot_pose_publisher'
 TWIST_QOS = {
-    'qos_overrides.{ns}/foot_pose_publisher/left_foot/twist.publisher.durability':
-        'transient_local',
-    'qos_overrides.{ns}/foot_pose_publisher/right_foot/twist.publisher.reliability':
-        'best_effort',
+    NODE + '/left_foot/twist.publisher.durability': 'transient_local',
+    NODE + '/right_foot/twist.publisher.reliability': 'best_effort',
 }
 RENAMED = ['-r', '__node:=feet', '-r', 'joint_states:=/yarp/state/joints',
            '-r', '~/left_foot/pose:=/where/left']

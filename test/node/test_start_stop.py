@@ -36,10 +36,10 @@ BAD = {
     '-p kinematics_file:=/no/such.yaml': 'cannot read /no/such.yaml',
     '-p kinematics_file:=/': 'cannot read /: ',
     '-p kinematics_file:=true': 'parameter kinematics_file: found True, allowed: path of a file',
-    '-p description_from_topic:=true -p kinematics_file:=a.urdf':
-        "parameter description_from_topic: found true beside kinematics_file 'a.urdf'; allowed",
-    '-p description_from_topic:=true -p version:=v1':
-        "parameter version: found 'v1', allowed with description_from_topic: none, or urdf",
+    '-p description_from_topic:=true -p kinematics_file:=a.urdf': (
+        "parameter description_from_topic: found true beside kinematics_file 'a.urdf'; allowed"),
+    '-p description_from_topic:=true -p version:=v1': (
+        "parameter version: found 'v1', allowed with description_from_topic: none, or urdf"),
     '-p description_from_topic:=true -p chains:=[]': 'parameter chains: no chain is named',
     '-p joint_prefix:=3': 'parameter joint_prefix: found 3, allowed: printable characters',
     '-p use_sim_time:=5': "'use_sim_time'",

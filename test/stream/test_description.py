@@ -63,7 +63,9 @@ def test_one_that_cannot_be_used_is_an_error_until_another_one_comes(names):
     levels = [note.level for note in description.notes(['/robot_state_publisher'])]
     if names and names[-1] in BAD:
         assert levels == ['error']
-        stays = 'the one before stays' if used else 'nothing is published until another one comes'
+        stays = 'nothing is published until another one comes'
+        if used:
+            stays = 'the one before stays'
         assert texts(description)[0].endswith(f'; {stays}')
     else:
         assert levels == ([] if names else ['warning'])
