@@ -10,8 +10,13 @@ SHARE = f'share/{PACKAGE}'
 # `colcon build --symlink-install` runs this file in a folder that has no README.
 README = Path(__file__).with_name('README.md')
 
-ROS, KILTED = ([f'ros-{release}-{name}' for name in (
-    'common-interfaces', 'rclpy', 'rmw-fastrtps-cpp')] for release in ('jazzy', 'kilted'))
+ROS, KILTED = (
+    [
+        f'ros-{release}-{name}'
+        for name in ('common-interfaces', 'rclpy', 'rmw-fastrtps-cpp')
+    ]
+    for release in ('jazzy', 'kilted')
+)
 TOOLS = [
     'argcomplete',
     'matplotlib>=3.6',
@@ -81,8 +86,14 @@ setup(
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
         (SHARE, ['package.xml']),
-        (f'{SHARE}/config', [path for kind in ('yaml', 'rviz', 'json')
-                             for path in sorted(glob(f'config/*.{kind}'))]),
+        (
+            f'{SHARE}/config',
+            [
+                path
+                for kind in ('yaml', 'rviz', 'json')
+                for path in sorted(glob(f'config/*.{kind}'))
+            ],
+        ),
         (f'{SHARE}/config/examples', sorted(glob('config/examples/*'))),
         (f'{SHARE}/launch', sorted(glob('launch/*_launch.py'))),
     ],

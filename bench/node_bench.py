@@ -94,22 +94,31 @@ def measure_node(report: Report, quick: bool) -> None:
                 latencies, lost = load.send(nodes[name], _RATE, count, _QUIET)
                 cpu_us = (cpu_ns(nodes[name].pid) - before) / 1000 / count
                 stretches[name].append(
-                    _Stretch(cpu_us, statistics.median(latencies or [math.nan]), lost))
+                    _Stretch(cpu_us, statistics.median(latencies or [math.nan]), lost)
+                )
     _report_cpu(report, stretches)
     _report_latency(report, stretches)
 
 
 def _report_cpu(report: Report, stretches: dict[str, list[_Stretch]]) -> None:
     cpu = _figures(stretches, 'cpu')
-    report.note(f'\nnode: CPU per message, two feet, {_RATE:.0f} Hz, {len(ROBOT_JOINTS)} joints')
+    report.note(
+        f'\nnode: CPU per message, two feet, {_RATE:.0f} Hz, {len(ROBOT_JOINTS)} joints'
+    )
     for name, readings in cpu.items():
         report.row(f'CPU, {name}', readings, 'us')
         lost = sum(_figures(stretches, 'lost')[name])
         if lost:
-            report.note(f'  {name}: {lost} of its messages were lost, expect odd figures')
+            report.note(
+                f'  {name}: {lost} of its messages were lost, expect odd figures'
+            )
     report.row('CPU, here / floor', ratio(cpu['here'], cpu['floor']), 'x', at_most=1.25)
-    report.row('CPU, with a description / without',
-               ratio(cpu['here, with a description'], cpu['here']), 'x', at_most=1.03)
+    report.row(
+        'CPU, with a description / without',
+        ratio(cpu['here, with a description'], cpu['here']),
+        'x',
+        at_most=1.03,
+    )
     report.row('CPU, here / plain', ratio(cpu['here'], cpu['plain']), 'x', at_most=0.32)
 
 
@@ -121,7 +130,9 @@ def _report_latency(report: Report, stretches: dict[str, list[_Stretch]]) -> Non
     report.row('p50, here / floor', ratio(p50['here'], p50['floor']), 'x', at_most=1.2)
 
 
-def _figures(stretches: dict[str, list[_Stretch]], figure: str) -> dict[str, list[float]]:
+def _figures(
+    stretches: dict[str, list[_Stretch]], figure: str
+) -> dict[str, list[float]]:
     """Return one figure of all stretches, by node."""
     figures = {}
     for name, of_name in stretches.items():
@@ -138,7 +149,8 @@ def _start(stack: ExitStack, load: _Load, namespace: str, kind: _Kind) -> _Node:
         parameters['description_from_topic'] = str(kind.described).lower()
     # In sessions of their own Linux would share out the cores among the nodes differently.
     process, check = stack.enter_context(
-        running_node(namespace, parameters, kind.program, own_session=False))
+        running_node(namespace, parameters, kind.program, own_session=False)
+    )
     node = _Node(namespace, process.pid, load.watch(namespace, kind))
     for _ in range(100):
         check()
@@ -164,30 +176,43 @@ class _Load:
         """Subscribe to the poses, and twists, of a node; return where their arrivals go."""
         if kind.described:
             self._describe(namespace)
-        arrivals = [self._watch(namespace, PoseStamped, f'{foot}/pose', kind) for foot in FEET]
+        arrivals = [
+            self._watch(namespace, PoseStamped, f'{foot}/pose', kind) for foot in FEET
+        ]
         if kind.publish_twist:
-            arrivals += [self._watch(namespace, TwistStamped, f'{foot}/twist', kind)
-                         for foot in FEET]
+            arrivals += [
+                self._watch(namespace, TwistStamped, f'{foot}/twist', kind)
+                for foot in FEET
+            ]
         return arrivals
 
     def _describe(self, namespace: str) -> None:
         """Send a description of the robot, as robot_state_publisher does."""
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        publisher = self._node.create_publisher(String, f'{namespace}/robot_description', latched)
+        publisher = self._node.create_publisher(
+            String, f'{namespace}/robot_description', latched
+        )
         publisher.publish(String(data=urdf_text('icub', Catalog.load().select(LEGS))))
 
-    def _watch(self, namespace: str, message: Any, topic: str, kind: _Kind) -> list[int]:
+    def _watch(
+        self, namespace: str, message: Any, topic: str, kind: _Kind
+    ) -> list[int]:
         arrived: list[int] = []
         reliability = ReliabilityPolicy.BEST_EFFORT
         if kind.reliable:
             reliability = ReliabilityPolicy.RELIABLE
         self._node.create_subscription(
-            message, f'{namespace}/foot_pose_publisher/{topic}',
+            message,
+            f'{namespace}/foot_pose_publisher/{topic}',
             lambda data: arrived.append(time.time_ns()),
-            QoSProfile(depth=_DEPTH, reliability=reliability), raw=True)
+            QoSProfile(depth=_DEPTH, reliability=reliability),
+            raw=True,
+        )
         return arrived
 
-    def send(self, node: _Node, rate: float, count: int, quiet: float) -> tuple[list[float], int]:
+    def send(
+        self, node: _Node, rate: float, count: int, quiet: float
+    ) -> tuple[list[float], int]:
         """Send messages through a node; return the latencies of its poses [us] and its losses."""
         for arrivals in node.arrivals:
             arrivals.clear()
@@ -205,7 +230,7 @@ class _Load:
         sent = self._connection.recv()
         # Paired by their order, since ready-made poses carry no stamp of theirs.
         latencies: list[float] = []
-        for arrivals in node.arrivals[:len(FEET)]:
+        for arrivals in node.arrivals[: len(FEET)]:
             latencies += [(at - by) / 1000 for by, at in zip(sent, arrivals)]
         return latencies, max(count - len(arrivals) for arrivals in node.arrivals)
 
@@ -224,10 +249,19 @@ def _robot(connection: Connection) -> None:
     meanwhile, waking it up would be most of the cost of every node.
     """
     node, qos = _node('robot')
-    gait = [bytearray(serialize_message(JointState(
-        name=ROBOT_JOINTS, velocity=[0.0] * len(ROBOT_JOINTS), effort=[0.0] * len(ROBOT_JOINTS),
-        position=joint_positions(2 * math.pi * i / _GAIT_MESSAGES))))
-        for i in range(_GAIT_MESSAGES)]
+    gait = [
+        bytearray(
+            serialize_message(
+                JointState(
+                    name=ROBOT_JOINTS,
+                    velocity=[0.0] * len(ROBOT_JOINTS),
+                    effort=[0.0] * len(ROBOT_JOINTS),
+                    position=joint_positions(2 * math.pi * i / _GAIT_MESSAGES),
+                )
+            )
+        )
+        for i in range(_GAIT_MESSAGES)
+    ]
     publishers: dict[str, Any] = {}
     gc.disable()
     while True:

@@ -23,7 +23,9 @@ NAMESPACE = '/soak'
 WINDOW = 10.0  # s
 WARM_UP = 60.0  # s
 LARGEST_GROWTH = 1.0  # MB
-LARGEST_SLOWDOWN = 1.5  # median latency, end to beginning; what else a machine does shows in it
+LARGEST_SLOWDOWN = (
+    1.5  # median latency, end to beginning; what else a machine does shows in it
+)
 
 
 class _Window(NamedTuple):
@@ -48,8 +50,10 @@ class _Window(NamedTuple):
         return f'{self.seconds:8.0f}{counts}{self.descriptions:14d}{figures}'
 
 
-_HEADING = ('  time s      sent  received  published  lost  descriptions   memory MB   '
-            'CPU us/message   latency p50 us')
+_HEADING = (
+    '  time s      sent  received  published  lost  descriptions   memory MB   '
+    'CPU us/message   latency p50 us'
+)
 
 
 class _Summary(NamedTuple):
@@ -61,18 +65,27 @@ class _Summary(NamedTuple):
     p50: float  # us
 
     def __str__(self) -> str:
-        return (f'memory grew by {self.memory_growth:.2f} MB after the first minute\n'
-                f'latency p50 {self.p50:.0f} us, late to early {self.slowdown:.2f}; CPU '
-                f'{self.cpu:.0f} us per message')
+        return (
+            f'memory grew by {self.memory_growth:.2f} MB after the first minute\n'
+            f'latency p50 {self.p50:.0f} us, late to early {self.slowdown:.2f}; CPU '
+            f'{self.cpu:.0f} us per message'
+        )
 
 
 def main() -> int:
     """Run for some minutes; return 0 if the node has endured, else 1."""
-    parser = argparse.ArgumentParser(prog='python -m bench.soak', description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        prog='python -m bench.soak',
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument('--minutes', type=float, default=10.0)
-    parser.add_argument('--descriptions', action=argparse.BooleanOptionalAction, default=True,
-                        help='take the kinematics from robot_description, which changes')
+    parser.add_argument(
+        '--descriptions',
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help='take the kinematics from robot_description, which changes',
+    )
     args = parser.parse_args()
     if not args.minutes > 0:
         parser.error(f'found --minutes {args.minutes:g}, allowed: more than 0')
@@ -115,7 +128,9 @@ def _soak(pid: int, minutes: float, describes: bool) -> list[str]:
     _print_totals(robot, seconds, summary)
     failures = _wrong_counts(robot) + _wrong_figures(summary)
     if describes and robot.descriptions < max(1, seconds // WINDOW):
-        failures.append(f'{robot.descriptions} changes of the description in {seconds:.0f} s')
+        failures.append(
+            f'{robot.descriptions} changes of the description in {seconds:.0f} s'
+        )
     return failures
 
 
@@ -133,7 +148,8 @@ def _window(pid: int, robot: SoakRobot, start: float, end: float) -> _Window:
         descriptions=robot.descriptions,
         memory=resident_bytes(pid) / 1e6,
         cpu=(cpu_ns(pid) - cpu) / 1000 / max(1, robot.sent - sent),
-        p50=statistics.median(latencies))
+        p50=statistics.median(latencies),
+    )
 
 
 def _summary(windows: Sequence[_Window]) -> _Summary:
@@ -146,16 +162,19 @@ def _summary(windows: Sequence[_Window]) -> _Summary:
         memory_growth=max(window.memory for window in warm) - warm[0].memory,
         slowdown=late / max(early, 1e-9),
         cpu=statistics.median([window.cpu for window in warm]),
-        p50=statistics.median([window.p50 for window in warm]))
+        p50=statistics.median([window.p50 for window in warm]),
+    )
 
 
 def _print_totals(robot: SoakRobot, seconds: float, summary: _Summary) -> None:
-    print(f'\n{seconds / 60:.1f} min: {robot.sent} messages sent, {robot.received} received; '
-          f'poses promised {_by_foot(robot.promised)}, published {_by_foot(robot.published)}, '
-          f'arrived {_by_foot(robot.arrived)}\n'
-          f'lost {robot.lost}, unexpected {robot.unexpected}; {robot.twists} twists, '
-          f'{robot.descriptions} changes of the description, {sum(robot.faults.values())} faults '
-          f'of {len(robot.faults)} kinds\n{summary}')
+    print(
+        f'\n{seconds / 60:.1f} min: {robot.sent} messages sent, {robot.received} received; '
+        f'poses promised {_by_foot(robot.promised)}, published {_by_foot(robot.published)}, '
+        f'arrived {_by_foot(robot.arrived)}\n'
+        f'lost {robot.lost}, unexpected {robot.unexpected}; {robot.twists} twists, '
+        f'{robot.descriptions} changes of the description, {sum(robot.faults.values())} faults '
+        f'of {len(robot.faults)} kinds\n{summary}'
+    )
     for complaint in robot.complaints[:10]:
         print(f'  {complaint}')
 
@@ -171,10 +190,15 @@ def _wrong_counts(robot: SoakRobot) -> list[str]:
         failures.append(f'{robot.sent} messages sent, {robot.received} received')
     for foot in FEET:
         promised, published, arrived = (
-            robot.promised[foot], robot.published[foot], robot.arrived[foot])
+            robot.promised[foot],
+            robot.published[foot],
+            robot.arrived[foot],
+        )
         if not promised == published == arrived:
-            failures.append(f'{foot}: {promised} poses promised, {published} published, '
-                            f'{arrived} arrived')
+            failures.append(
+                f'{foot}: {promised} poses promised, {published} published, '
+                f'{arrived} arrived'
+            )
     if robot.complaints:
         failures.append(f'{len(robot.complaints)} complaints')
     return failures

@@ -87,7 +87,9 @@ class SoakRobot:
         self._executor = EventsExecutor()
         self._executor.add_node(self._node)
         self._qos = QoSProfile(depth=DEPTH)
-        self._publisher = self._node.create_publisher(JointState, 'joint_states', self._qos)
+        self._publisher = self._node.create_publisher(
+            JointState, 'joint_states', self._qos
+        )
         self._client = AsyncParameterClient(self._node, NODE)
         self._bystander: Any = None
         self._messages = _messages(random.Random(1))
@@ -144,7 +146,9 @@ class SoakRobot:
         """Wait until every promise is kept and everything counted; count what is lost."""
         self._settle()
         if not self._take_counts():
-            self.complaints.append(f'no diagnostics of both legs within {_PATIENCE:g} s')
+            self.complaints.append(
+                f'no diagnostics of both legs within {_PATIENCE:g} s'
+            )
 
     def _settle(self) -> None:
         """Wait until every promise is kept, and count those that are not."""
@@ -170,7 +174,9 @@ class SoakRobot:
             self._executor.spin_once(timeout_sec=0.02)
         return True
 
-    def _send(self, kind: str, promised: tuple[bool, bool], step: int = 1_000_000) -> None:
+    def _send(
+        self, kind: str, promised: tuple[bool, bool], step: int = 1_000_000
+    ) -> None:
         """Send one message; `promised` says which feet must answer."""
         self._stamp += step
         sample = self.sent % SAMPLES
@@ -192,7 +198,11 @@ class SoakRobot:
             self._listen(PoseStamped, f'{NODE}/{foot}/pose', self._receiver(foot))
             self._listen(TwistStamped, f'{NODE}/{foot}/twist', self._count_twist)
         self._node.create_subscription(
-            DiagnosticArray, '/diagnostics', lambda array: self._count(array, feet), self._qos)
+            DiagnosticArray,
+            '/diagnostics',
+            lambda array: self._count(array, feet),
+            self._qos,
+        )
 
     def _listen(self, kind: Any, topic: str, receive: Callable[[bytes], None]) -> None:
         self._node.create_subscription(kind, topic, receive, self._qos, raw=True)
@@ -216,6 +226,7 @@ class SoakRobot:
                 self.latencies.append((now - promise.sent) / 1000)
             if self.arrived[foot] % CHECKED == 0:
                 self._check(foot, promise, data)
+
         return receive
 
     def _count_twist(self, data: bytes) -> None:
@@ -234,17 +245,23 @@ class SoakRobot:
 
     def _miss(self, foot: str, promise: Promise) -> None:
         self.lost += 1
-        self.complaints.append(f'{foot}: lost pose at {promise.stamp} during {promise.fault}')
+        self.complaints.append(
+            f'{foot}: lost pose at {promise.stamp} during {promise.fault}'
+        )
 
     def _check(self, foot: str, promise: Promise, data: bytes) -> None:
         """Check that a pose is that of some configuration that has been set."""
-        q = joint_positions(2 * math.pi * promise.sample / SAMPLES)[_LEGS_AT:_LEGS_AT + 6]
-        pose = _POSE.unpack(data[-_POSE.size:])
+        q = joint_positions(2 * math.pi * promise.sample / SAMPLES)[
+            _LEGS_AT : _LEGS_AT + 6
+        ]
+        pose = _POSE.unpack(data[-_POSE.size :])
         for chain in self._chains[foot]:
             if _differ_by(pose, chain.pose(q)) <= self._tolerance:
                 self._follow_description(chain.version)
                 return
-        self.complaints.append(f'{foot}: pose of no configuration during {promise.fault}')
+        self.complaints.append(
+            f'{foot}: pose of no configuration during {promise.fault}'
+        )
 
     def _start_describing(self) -> None:
         """Publish the description as robot_state_publisher does, every few seconds another."""
@@ -306,9 +323,13 @@ class SoakRobot:
         self._settle()
         self._publisher.wait_for_all_acked(Duration(seconds=_PATIENCE))
         self._node.destroy_publisher(self._publisher)
-        self._publisher = self._node.create_publisher(JointState, 'joint_states', self._qos)
+        self._publisher = self._node.create_publisher(
+            JointState, 'joint_states', self._qos
+        )
         if not self._spin_until(self._is_subscribed, _DISCOVERY):
-            self.complaints.append('the node does not subscribe to the publisher that restarted')
+            self.complaints.append(
+                'the node does not subscribe to the publisher that restarted'
+            )
 
     def _is_subscribed(self) -> bool:
         return self._publisher.get_subscription_count() > 0
@@ -316,7 +337,8 @@ class SoakRobot:
     def _subscriber(self) -> None:
         if self._bystander is None:
             self._bystander = self._node.create_subscription(
-                PoseStamped, f'{NODE}/left_foot/pose', lambda data: None, 10, raw=True)
+                PoseStamped, f'{NODE}/left_foot/pose', lambda data: None, 10, raw=True
+            )
         else:
             self._node.destroy_subscription(self._bystander)
             self._bystander = None
@@ -359,13 +381,17 @@ def _messages(order: random.Random) -> dict[str, list[bytearray]]:
     for sample in range(SAMPLES):
         q = joint_positions(2 * math.pi * sample / SAMPLES)
         for kind, (names, positions) in _variants(q, reordered).items():
-            message = JointState(name=names, position=positions, velocity=[0.1] * len(positions))
+            message = JointState(
+                name=names, position=positions, velocity=[0.1] * len(positions)
+            )
             kinds.setdefault(kind, []).append(bytearray(serialize_message(message)))
     kinds['malformed'] = [data[:16] for data in kinds['plain']]
     return kinds
 
 
-def _variants(q: list[float], reordered: list[int]) -> dict[str, tuple[list[str], list[float]]]:
+def _variants(
+    q: list[float], reordered: list[int]
+) -> dict[str, tuple[list[str], list[float]]]:
     """Return the names and positions of every kind of message."""
     names = list(ROBOT_JOINTS)
     left, right = slice(_LEGS_AT, _LEGS_AT + 6), slice(_LEGS_AT + 6, _LEGS_AT + 12)

@@ -62,7 +62,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     if '_ARGCOMPLETE' in os.environ:
         _complete(os.environ['COMP_LINE'])
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors='backslashreplace')  # a terminal that is not UTF-8
+        sys.stdout.reconfigure(
+            errors='backslashreplace'
+        )  # a terminal that is not UTF-8
     try:
         status = _run(words)
         if sys.stdout:
@@ -96,7 +98,9 @@ def parse(words: list[str]) -> argparse.Namespace:
     command = words[0] if words else '-h'
     if command in parsers:
         parsers[command].refuse_unknown_options(words[1:])
-        return parsers[command].parse_intermixed_args(words[1:])  # as in: bag IN --twist OUT
+        return parsers[command].parse_intermixed_args(
+            words[1:]
+        )  # as in: bag IN --twist OUT
     if not command.startswith('-'):
         raise UnknownNameError('command', command, COMMANDS, 'leg_fk -h explains them')
     parser.refuse_unknown_options(words)
@@ -105,11 +109,16 @@ def parse(words: list[str]) -> argparse.Namespace:
 
 def _parsers(words: Sequence[str]) -> tuple[Parser, dict[str, Parser]]:
     """Return the command's parser, and its subcommands'; only the one asked for has options."""
-    parser = Parser(prog='leg_fk', usage='leg_fk COMMAND ...', description=DESCRIPTION,
-                    epilog=EXAMPLES)
+    parser = Parser(
+        prog='leg_fk',
+        usage='leg_fk COMMAND ...',
+        description=DESCRIPTION,
+        epilog=EXAMPLES,
+    )
     parser.add_argument('--version', action='version', version=f'leg_fk {__version__}')
-    subparsers = parser.add_subparsers(title='commands', metavar='COMMAND', required=True,
-                                       prog='leg_fk')
+    subparsers = parser.add_subparsers(
+        title='commands', metavar='COMMAND', required=True, prog='leg_fk'
+    )
     for name, purpose in COMMANDS.items():
         subparser = subparsers.add_parser(name, help=purpose, description=purpose)
         if name in words[:1]:
@@ -123,6 +132,7 @@ def _parsers(words: Sequence[str]) -> tuple[Parser, dict[str, Parser]]:
 def _complete(line: str) -> None:
     """Offer the shell what may follow, and end the process."""
     from argcomplete import autocomplete  # which has had the shell set the variables
+
     parser, _ = _parsers(line.split()[1:])
     autocomplete(parser)
 

@@ -26,8 +26,14 @@ class UnknownNameError(LegFKError):
         of: what should have the name, such as `chain left_leg`; empty if that is clear.
     """
 
-    def __init__(self, kind: str, name: str, choices: Iterable[str], advice: str = '',
-                 of: str = '') -> None:
+    def __init__(
+        self,
+        kind: str,
+        name: str,
+        choices: Iterable[str],
+        advice: str = '',
+        of: str = '',
+    ) -> None:
         self.kind = kind
         self.name = name
         self.choices = tuple(choices)
@@ -58,8 +64,10 @@ class VersionNeededError(LegFKError):
         super().__init__(chain, self.versions)
 
     def __str__(self) -> str:
-        return (f'chain {self.chain} has several versions and no default; give one of '
-                f'{", ".join(self.versions)}')
+        return (
+            f'chain {self.chain} has several versions and no default; give one of '
+            f'{", ".join(self.versions)}'
+        )
 
 
 class JointVectorError(LegFKError):
@@ -110,7 +118,9 @@ class CatalogError(InputFileError):
         allowed: what may stand there.
     """
 
-    def __init__(self, file: str, line: int, where: str, found: str, allowed: str) -> None:
+    def __init__(
+        self, file: str, line: int, where: str, found: str, allowed: str
+    ) -> None:
         fault = f'{where}: found {found}, allowed: {allowed}' if where else found
         super().__init__(file, fault)
         self.line = line

@@ -30,15 +30,23 @@ from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.utilities import make_namespace_absolute, prefix_namespace
 
 NAME = 'foot_pose_publisher'
-SIM_TIME = Parameter('use_sim_time', False, 'Take the time from /clock.', 'true or false')
+SIM_TIME = Parameter(
+    'use_sim_time', False, 'Take the time from /clock.', 'true or false'
+)
 AS_PARAMETERS = (*PARAMETERS, SIM_TIME)
 OTHERS = {  # default and meaning
     'joint_states': ('joint_states', 'Topic of the joint states.'),
-    'params_file': ('', 'YAML file with node parameters; an argument given here wins over it.'),
+    'params_file': (
+        '',
+        'YAML file with node parameters; an argument given here wins over it.',
+    ),
     'namespace': ('', 'Namespace of the node and of its topics.'),
     'log_level': ('info', 'What the node logs: debug, info, warn, error or fatal.'),
-    'rviz': ('false', 'Open RViz with the poses and the skeletons, for which publish_markers is '
-             'then true unless given.'),
+    'rviz': (
+        'false',
+        'Open RViz with the poses and the skeletons, for which publish_markers is '
+        'then true unless given.',
+    ),
 }
 TRUTH = {'true': True, '1': True, 'false': False, '0': False, '': False}
 
@@ -68,14 +76,23 @@ def generate_launch_description() -> LaunchDescription:
     arguments = []
     for parameter in AS_PARAMETERS:
         description = f'{parameter.description} Allowed: {parameter.allowed}.'
-        arguments.append(DeclareLaunchArgument(
-            parameter.name, default_value=Unset(written(parameter.default)),
-            description=description))
+        arguments.append(
+            DeclareLaunchArgument(
+                parameter.name,
+                default_value=Unset(written(parameter.default)),
+                description=description,
+            )
+        )
     for name, (default, description) in OTHERS.items():
-        arguments.append(DeclareLaunchArgument(
-            name, default_value=Unset(default), description=description))
+        arguments.append(
+            DeclareLaunchArgument(
+                name, default_value=Unset(default), description=description
+            )
+        )
     # In a group of its own nothing that is declared here is left behind for other launch files.
-    return LaunchDescription([GroupAction([*arguments, OpaqueFunction(function=nodes)])])
+    return LaunchDescription(
+        [GroupAction([*arguments, OpaqueFunction(function=nodes)])]
+    )
 
 
 def written(value: Any) -> str:
@@ -94,7 +111,9 @@ def nodes(context: LaunchContext) -> list[Node]:
     parameters: dict[str, ParameterValue] = {}
     for parameter in AS_PARAMETERS:
         if given[parameter.name]:
-            parameters[parameter.name] = parameter_value(parameter, given[parameter.name], context)
+            parameters[parameter.name] = parameter_value(
+                parameter, given[parameter.name], context
+            )
     params_file = checked_file(given['params_file'])
     with_rviz = truth('rviz', given['rviz'])
     if with_rviz:
@@ -107,8 +126,9 @@ def nodes(context: LaunchContext) -> list[Node]:
     return started
 
 
-def publisher(given: Mapping[str, str], params_file: str,
-              parameters: Mapping[str, ParameterValue]) -> Node:
+def publisher(
+    given: Mapping[str, str], params_file: str, parameters: Mapping[str, ParameterValue]
+) -> Node:
     """Return the node.
 
     Name and namespace are both given: only then are the parameters written for the node's full
@@ -144,16 +164,27 @@ def viewer(node: str, params_file: str, given: Mapping[str, Any]) -> list[Node]:
     except PackageNotFoundError:
         get_logger(NAME).warning('RViz is not installed; the node runs without it')
         return []
-    with NamedTemporaryFile('w', prefix='foot_poses_', suffix='.rviz', delete=False) as file:
+    with NamedTemporaryFile(
+        'w', prefix='foot_poses_', suffix='.rviz', delete=False
+    ) as file:
         file.write(rviz_config(configuration, node))
-    return [Node(package='rviz2', executable='rviz2', name='foot_poses_rviz',
-                 arguments=['-d', file.name])]
+    return [
+        Node(
+            package='rviz2',
+            executable='rviz2',
+            name='foot_poses_rviz',
+            arguments=['-d', file.name],
+        )
+    ]
 
 
 def full_name(context: LaunchContext, namespace: str) -> str:
     """Return the full name of the node, in a namespace that a launch file has pushed or not."""
     pushed = context.launch_configurations.get('ros_namespace')
-    return make_namespace_absolute(prefix_namespace(pushed, namespace)).rstrip('/') + f'/{NAME}'
+    return (
+        make_namespace_absolute(prefix_namespace(pushed, namespace)).rstrip('/')
+        + f'/{NAME}'
+    )
 
 
 def refuse_misspelt(argv: Sequence[str]) -> None:
@@ -170,7 +201,9 @@ def refuse_misspelt(argv: Sequence[str]) -> None:
             raise RuntimeError(str(UnknownNameError('argument', name, ours)))
 
 
-def parameter_value(parameter: Parameter, found: str, context: LaunchContext) -> ParameterValue:
+def parameter_value(
+    parameter: Parameter, found: str, context: LaunchContext
+) -> ParameterValue:
     """Return an argument as a parameter of its type."""
     kind = type(parameter.default)
     if kind is bool:

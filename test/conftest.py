@@ -48,7 +48,13 @@ settings.load_profile('icub_leg_fk')
 def pytest_make_collect_report(collector):
     """Skip a file of tests, with the reason, whose imports from ROS 2 are not installed."""
     report = (yield).get_result()
-    missing = re.search(r"No module named '(rclpy|\w+_(?:msgs|interfaces))", str(report.longrepr))
+    missing = re.search(
+        r"No module named '(rclpy|\w+_(?:msgs|interfaces))", str(report.longrepr)
+    )
     if report.failed and missing:
         report.outcome = 'skipped'
-        report.longrepr = (str(collector.path), 1, f'Skipped: needs {missing[1]} of ROS 2')
+        report.longrepr = (
+            str(collector.path),
+            1,
+            f'Skipped: needs {missing[1]} of ROS 2',
+        )

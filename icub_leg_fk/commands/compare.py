@@ -72,23 +72,39 @@ class Comparison(NamedTuple):
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument('urdf', metavar='ROBOT.urdf', help='the URDF of the robot')
-    parser.add_argument('--chains', metavar='CHAIN', nargs='+',
-                        help='chains to compare (default: all whose joints the robot has)')
+    parser.add_argument(
+        '--chains',
+        metavar='CHAIN',
+        nargs='+',
+        help='chains to compare (default: all whose joints the robot has)',
+    )
     options.add(parser, '--kinematics-file', '--root', '--json')
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the comparison."""
     catalog, urdf = options.load_catalog(args), Urdf.load(args.urdf)
-    found, not_compared = _compare_all(catalog, args.chains or list(catalog.chains), urdf)
+    found, not_compared = _compare_all(
+        catalog, args.chains or list(catalog.chains), urdf
+    )
     nearest = _nearest_of_each_chain(found)
     advice = [_summary(row, found) for row in nearest]
-    advice += [f'{name}: not compared: {reason}' for name, reason in not_compared.items()]
+    advice += [
+        f'{name}: not compared: {reason}' for name, reason in not_compared.items()
+    ]
     advice += _what_to_run(nearest, urdf, args)
     if args.json:
         differences = [_as_json(row, row in nearest) for row in found]
-        print(text.as_json({'urdf': args.urdf, 'robot': urdf.name, 'advice': advice,
-                            'differences': differences}))
+        print(
+            text.as_json(
+                {
+                    'urdf': args.urdf,
+                    'robot': urdf.name,
+                    'advice': advice,
+                    'differences': differences,
+                }
+            )
+        )
         return 0
     print(f'{args.urdf} ({urdf.name}) compared with the tables of')
     print(f'{catalog.file}')
@@ -97,12 +113,15 @@ def run(args: argparse.Namespace) -> int:
     print()
     for line in advice:
         is_command = line.startswith('  ')
-        print(line if is_command else textwrap.fill(line, _WIDTH, subsequent_indent='  '))
+        print(
+            line if is_command else textwrap.fill(line, _WIDTH, subsequent_indent='  ')
+        )
     return 0
 
 
-def _compare_all(catalog: Catalog, names: Sequence[str], urdf: Urdf
-                 ) -> tuple[list[Comparison], dict[str, str]]:
+def _compare_all(
+    catalog: Catalog, names: Sequence[str], urdf: Urdf
+) -> tuple[list[Comparison], dict[str, str]]:
     """Return the comparisons of some chains, and why the others are not compared, by name.
 
     Raises:
@@ -116,13 +135,20 @@ def _compare_all(catalog: Catalog, names: Sequence[str], urdf: Urdf
         if not rows:
             not_compared[name] = reason
     if not found:
-        reasons = '; '.join(f'{name}: {reason}' for name, reason in not_compared.items())
-        raise InputFileError(urdf.file, f'cannot be compared: {reasons}; -k takes tables with the '
-                             'names of this robot')
+        reasons = '; '.join(
+            f'{name}: {reason}' for name, reason in not_compared.items()
+        )
+        raise InputFileError(
+            urdf.file,
+            f'cannot be compared: {reasons}; -k takes tables with the '
+            'names of this robot',
+        )
     return found, not_compared
 
 
-def _compare_chain(catalog: Catalog, name: str, urdf: Urdf) -> tuple[list[Comparison], str]:
+def _compare_chain(
+    catalog: Catalog, name: str, urdf: Urdf
+) -> tuple[list[Comparison], str]:
     """Return the comparisons of a chain's versions, and why there is none if there is none."""
     rows: list[Comparison] = []
     reasons: list[str] = []
@@ -157,24 +183,36 @@ def compared(table: Chain, frames: Sequence[str], urdf: Urdf) -> list[Comparison
     for frame in frames:
         chain = table.with_frame(frame)
         ours = chain.forward(positions)
-        theirs = urdf.forward(chain.root_frame, chain.frame_id,
-                              _for_masters(positions, chain, urdf))
+        theirs = urdf.forward(
+            chain.root_frame, chain.frame_id, _for_masters(positions, chain, urdf)
+        )
         if not rows and chain.n >= _FEWEST_JOINTS:
             X, Y = fit(ours, theirs)
             fitted = distance(X @ ours @ Y, theirs)
             root_turn = turn_in_words(X[:3, :3]) if fitted.deg <= _NEAR else ''
         turn = turn_of_axes(X @ ours if root_turn else ours, theirs)
-        rows.append(Comparison(chain, distance(ours @ turn, theirs),
-                               turn_in_words(turn[:3, :3]), fitted, root_turn))
+        rows.append(
+            Comparison(
+                chain,
+                distance(ours @ turn, theirs),
+                turn_in_words(turn[:3, :3]),
+                fitted,
+                root_turn,
+            )
+        )
     return rows
 
 
-def _for_masters(positions: Mapping[str, Array], chain: Chain, urdf: Urdf) -> dict[str, Array]:
+def _for_masters(
+    positions: Mapping[str, Array], chain: Chain, urdf: Urdf
+) -> dict[str, Array]:
     """Return positions with those of other joints that move the chain's in the robot."""
     completed = dict(positions)
     for joint in urdf.path(chain.root_frame, chain.frame_id):
         if joint.moves and joint.name in positions and joint.moved_by not in positions:
-            completed[joint.moved_by] = (positions[joint.name] - joint.offset) / joint.gain
+            completed[joint.moved_by] = (
+                positions[joint.name] - joint.offset
+            ) / joint.gain
     return completed
 
 
@@ -190,8 +228,10 @@ def _lacks(urdf: Urdf, chain: Chain) -> str:
     on_the_way = {joint.name for joint in path} | {joint.moved_by for joint in path}
     missing = [name for name in chain.joint_names if name not in on_the_way]
     if missing:
-        return (f'between {chain.root_frame} and {chain.frame_id} the robot has no joint '
-                f'{", ".join(missing)}')
+        return (
+            f'between {chain.root_frame} and {chain.frame_id} the robot has no joint '
+            f'{", ".join(missing)}'
+        )
     return ''
 
 
@@ -213,8 +253,10 @@ def _summary(row: Comparison, rows: Sequence[Comparison]) -> str:
     if _is_near(direct):
         words = f'use {chain.version}, which is this robot to {off}'
     elif row.root_turn and fitted and fitted.mm <= _USABLE:
-        words = (f"{chain.version} fits to {_short(fitted.mm)} mm, but the robot's root frame is "
-                 f'turned by {row.root_turn}')
+        words = (
+            f"{chain.version} fits to {_short(fitted.mm)} mm, but the robot's root frame is "
+            f'turned by {row.root_turn}'
+        )
     elif direct.mm <= _USABLE:
         words = f'{chain.version} is nearest, to {off}'
     else:
@@ -230,9 +272,14 @@ def _other_axes(row: Comparison, rows: Sequence[Comparison]) -> str:
     """Return which frames of a version have other axes than the robot's of their name."""
     words = ''
     for other in rows:
-        is_same = (other.chain.name, other.chain.version) == (row.chain.name, row.chain.version)
+        is_same = (other.chain.name, other.chain.version) == (
+            row.chain.name,
+            row.chain.version,
+        )
         if is_same and other.turn:
-            words += f'; its {other.chain.frame_id} has other axes, turned by {other.turn}'
+            words += (
+                f'; its {other.chain.frame_id} has other axes, turned by {other.turn}'
+            )
     return words
 
 
@@ -240,8 +287,9 @@ def _is_near(found: Difference) -> bool:
     return found.mm <= _NEAR and found.deg <= _NEAR
 
 
-def _what_to_run(nearest: Sequence[Comparison], urdf: Urdf, args: argparse.Namespace
-                 ) -> list[str]:
+def _what_to_run(
+    nearest: Sequence[Comparison], urdf: Urdf, args: argparse.Namespace
+) -> list[str]:
     """Return what to run for this robot, ready to paste."""
     chains = [row.chain for row in nearest]
     if all(_is_near(row.direct) for row in nearest):
@@ -249,8 +297,11 @@ def _what_to_run(nearest: Sequence[Comparison], urdf: Urdf, args: argparse.Names
         file = ''
         if args.kinematics_file:
             file = f' -p kinematics_file:={_absolute(args.kinematics_file)}'
-        return ['The tables are this robot:', f'  {_NODE} \\',
-                f'    -p chains:="[{named}]"{file}']
+        return [
+            'The tables are this robot:',
+            f'  {_NODE} \\',
+            f'    -p chains:="[{named}]"{file}',
+        ]
     robot = Catalog.from_urdf(urdf)
     output = shlex.quote(f'{Path(args.urdf).stem}.yaml')
     node, table = '', ''
@@ -259,11 +310,15 @@ def _what_to_run(nearest: Sequence[Comparison], urdf: Urdf, args: argparse.Names
         root = chains[0].root_frame
         node = f' -p chains:="[{", ".join(tips)}]" -p root_frame:={root}'
         table = f' --root {shlex.quote(root)} --tips {shlex.join(tips)}'
-    return ["To compute with the robot's own geometry, from its description, from this file, or "
-            'from a table of it:',
-            f'  {_NODE} \\', f'    -p description_from_topic:=true{node}',
-            f'  {_NODE} \\', f'    -p kinematics_file:={_absolute(args.urdf)}{node}',
-            f'  leg_fk table {shlex.quote(args.urdf)}{table} -o {output}']
+    return [
+        "To compute with the robot's own geometry, from its description, from this file, or "
+        'from a table of it:',
+        f'  {_NODE} \\',
+        f'    -p description_from_topic:=true{node}',
+        f'  {_NODE} \\',
+        f'    -p kinematics_file:={_absolute(args.urdf)}{node}',
+        f'  leg_fk table {shlex.quote(args.urdf)}{table} -o {output}',
+    ]
 
 
 def _absolute(file: str) -> str:
@@ -280,8 +335,10 @@ def _table(rows: Sequence[Sequence[str]]) -> list[str]:
     widths = [max(map(len, column)) for column in zip(_HEADER, *rows, strict=True)]
     lines = []
     for cells in (_HEADER, *rows):
-        padded = [cell.rjust(width) if index in _NUMBERS else cell.ljust(width)
-                  for index, (cell, width) in enumerate(zip(cells, widths, strict=True))]
+        padded = [
+            cell.rjust(width) if index in _NUMBERS else cell.ljust(width)
+            for index, (cell, width) in enumerate(zip(cells, widths, strict=True))
+        ]
         lines.append('  '.join(padded).rstrip())
     return lines
 
@@ -290,8 +347,15 @@ def _cells(row: Comparison, is_nearest: bool) -> list[str]:
     fits = ['-', '-']
     if row.fitted:
         fits = [_number(row.fitted.mm), _number(row.fitted.deg)]
-    return [row.chain.name, row.chain.version, row.chain.frame_id, _number(row.direct.mm),
-            _number(row.direct.deg), *fits, '<- nearest' if is_nearest else '']
+    return [
+        row.chain.name,
+        row.chain.version,
+        row.chain.frame_id,
+        _number(row.direct.mm),
+        _number(row.direct.deg),
+        *fits,
+        '<- nearest' if is_nearest else '',
+    ]
 
 
 def _number(value: float) -> str:
@@ -302,12 +366,22 @@ def _as_json(row: Comparison, is_nearest: bool) -> dict[str, Any]:
     mm, deg = _pairs(row.direct)
     fitted_mm, fitted_deg = _pairs(row.fitted) if row.fitted else (None, None)
     return {
-        'chain': row.chain.name, 'version': row.chain.version,
-        'root_frame': row.chain.root_frame, 'frame': row.chain.frame_id, 'mm': mm, 'deg': deg,
-        'turn': row.turn, 'fitted_mm': fitted_mm, 'fitted_deg': fitted_deg,
-        'root_turn': row.root_turn, 'nearest': is_nearest}
+        'chain': row.chain.name,
+        'version': row.chain.version,
+        'root_frame': row.chain.root_frame,
+        'frame': row.chain.frame_id,
+        'mm': mm,
+        'deg': deg,
+        'turn': row.turn,
+        'fitted_mm': fitted_mm,
+        'fitted_deg': fitted_deg,
+        'root_turn': row.root_turn,
+        'nearest': is_nearest,
+    }
 
 
 def _pairs(found: Difference) -> tuple[dict[str, float], dict[str, float]]:
-    return ({'largest': found.mm, 'mean': found.mean_mm},
-            {'largest': found.deg, 'mean': found.mean_deg})
+    return (
+        {'largest': found.mm, 'mean': found.mean_mm},
+        {'largest': found.deg, 'mean': found.mean_deg},
+    )

@@ -46,15 +46,29 @@ _COLOURS = ('color(97)', 'color(172)')  # of the left and the right foot, as in 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument('--recording', metavar='FILE', type=Path,
-                        help='CSV file to play, in its own timing (default: a synthetic gait)')
-    parser.add_argument('--seconds', metavar='S', type=options.number_between(0.1, 3600),
-                        help='how long to play (default: the whole recording)')
-    parser.add_argument('--save', metavar='DIR', type=Path,
-                        help='keep the joint states as a rosbag2 bag')
+    parser.add_argument(
+        '--recording',
+        metavar='FILE',
+        type=Path,
+        help='CSV file to play, in its own timing (default: a synthetic gait)',
+    )
+    parser.add_argument(
+        '--seconds',
+        metavar='S',
+        type=options.number_between(0.1, 3600),
+        help='how long to play (default: the whole recording)',
+    )
+    parser.add_argument(
+        '--save',
+        metavar='DIR',
+        type=Path,
+        help='keep the joint states as a rosbag2 bag',
+    )
     options.add(parser, '--version', '--foot-frame')
-    options.add_output(parser, 'picture to write, .png, .svg or .pdf (default: demo.png, which is '
-                       'replaced)')
+    options.add_output(
+        parser,
+        'picture to write, .png, .svg or .pdf (default: demo.png, which is replaced)',
+    )
     parser.set_defaults(kinematics_file=None)
 
 
@@ -73,13 +87,18 @@ def run(args: argparse.Namespace) -> int:
     except replays.DemoError as error:
         print(f'leg_fk: error: {error}', file=sys.stderr)
         return 1
-    status = conclude(replay.answers, recording.times[:len(replay.sent)].tolist(), is_whole)
+    status = conclude(
+        replay.answers, recording.times[: len(replay.sent)].tolist(), is_whole
+    )
     if is_whole and all(answers.arrived for answers in replay.answers):
         tracks = _tracks(recording, chains, replay.answers)
         name = args.recording.name if args.recording else 'synthetic gait'
         title = f'{name}   {chains[0].version}'
-        save_picture(lambda: feet_figure(tracks, default_instants(tracks), title), picture,
-                     force=may_replace)
+        save_picture(
+            lambda: feet_figure(tracks, default_instants(tracks), title),
+            picture,
+            force=may_replace,
+        )
         print(f'picture       {picture}', flush=True)
     if is_whole and args.save:
         recordings.write_joint_states(args.save, replay.sent, force=args.force)
@@ -106,15 +125,22 @@ def _play(recording: JointRecording, chains: Sequence[Chain]) -> tuple[Replay, b
     domain = replays.stay_on_this_machine()
     namespace = f'/leg_fk_demo_{os.getpid()}'
     version, frame = chains[0].version, chains[0].frame
-    print(f'iCub legs {version}: {len(recording.times)} JointState messages to '
-          'foot_pose_publisher, poses back over DDS')
-    print(f'(this machine only, ROS_DOMAIN_ID {domain}, namespace {namespace})\n', flush=True)
+    print(
+        f'iCub legs {version}: {len(recording.times)} JointState messages to '
+        'foot_pose_publisher, poses back over DDS'
+    )
+    print(
+        f'(this machine only, ROS_DOMAIN_ID {domain}, namespace {namespace})\n',
+        flush=True,
+    )
     tips = [chain.tip for chain in chains]
     parameters = {'version': version, 'foot_frame': frame}
     parameters |= replays.lossless(namespace, tips, replays.DEPTH)
     seconds = float(recording.times[-1] - recording.times[0])
-    with closing(Replay(recording, namespace, tips)) as replay, \
-            replays.running_node(namespace, parameters) as (_, check):
+    with (
+        closing(Replay(recording, namespace, tips)) as replay,
+        replays.running_node(namespace, parameters) as (_, check),
+    ):
         display = Display(replay.answers, seconds, chains[0].root_frame)
         replay.wait_for_node(check)
         try:
@@ -125,8 +151,9 @@ def _play(recording: JointRecording, chains: Sequence[Chain]) -> tuple[Replay, b
     return replay, True
 
 
-def _tracks(recording: JointRecording, chains: Sequence[Chain], answers: Sequence[Answers]
-            ) -> list[recordings.ChainTrack]:
+def _tracks(
+    recording: JointRecording, chains: Sequence[Chain], answers: Sequence[Answers]
+) -> list[recordings.ChainTrack]:
     """Return the chains with the poses that have come."""
     tracks = []
     for chain, received in zip(chains, answers, strict=True):
@@ -159,8 +186,11 @@ def conclude(answers: Sequence[Answers], times: Sequence[float], is_whole: bool)
         return 128 + 2  # as a shell reports SIGINT
     unexpected = sum(answer.unexpected for answer in answers)
     if lost or unexpected:
-        print(f'leg_fk: error: of {sent * len(answers)} poses {lost} did not arrive, and '
-              f'{unexpected} arrived that belong to no message', file=sys.stderr)
+        print(
+            f'leg_fk: error: of {sent * len(answers)} poses {lost} did not arrive, and '
+            f'{unexpected} arrived that belong to no message',
+            file=sys.stderr,
+        )
         return 1
     return 0
 
@@ -194,7 +224,8 @@ class Display:
                 screen=True,
                 auto_refresh=False,
                 redirect_stdout=False,
-                redirect_stderr=False)
+                redirect_stderr=False,
+            )
         self.period = 0.1 if self._live else 1.0
 
     def __enter__(self) -> Display:
@@ -231,7 +262,10 @@ class Display:
         table = self._rich.table.Table(
             box=None,
             title=Text(f'poses in {self._frame}, in m'),
-            caption=Text(f'{self._elapsed:.2f} of {self._seconds:.2f} s, {poses} poses'))
+            caption=Text(
+                f'{self._elapsed:.2f} of {self._seconds:.2f} s, {poses} poses'
+            ),
+        )
         table.add_column(no_wrap=True)
         for name in _COLUMNS:
             table.add_column(Text(name), justify='right', no_wrap=True)

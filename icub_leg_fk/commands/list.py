@@ -38,7 +38,9 @@ def run(args: argparse.Namespace) -> int:
 
 def _as_text(entry: ChainEntry) -> list[str]:
     paragraphs = {
-        'tip': _by_version(entry, lambda chain: [f'{chain.tip}, in {chain.root_frame}']),
+        'tip': _by_version(
+            entry, lambda chain: [f'{chain.tip}, in {chain.root_frame}']
+        ),
         'root axes': _by_version(entry, _root_axes),
         'tip frames': _by_version(entry, _tip_frames),
         'versions': [_version(entry, version) for version in entry.versions],

@@ -138,9 +138,6 @@ def _extreme_near(times: Array, distance: Array, near: float) -> float:
     return float(like[np.abs(like - near).argmin()])
 
 
-
-
-
 def _between(
     tracks: Sequence[ChainTrack], begin: float | None, end: float | None
 ) -> list[ChainTrack]:

@@ -33,21 +33,40 @@ _SAMPLES = 1000
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument('urdf', metavar='ROBOT.urdf', help='the URDF; of a xacro file make one '
-                        'first: xacro FILE > robot.urdf')
+    parser.add_argument(
+        'urdf',
+        metavar='ROBOT.urdf',
+        help='the URDF; of a xacro file make one first: xacro FILE > robot.urdf',
+    )
     options.add(parser, '--root')
-    parser.add_argument('--tips', metavar='LINK', nargs='+',
-                        help="links to write a chain for (default: the iCub's legs and head, as "
-                             'far as the robot has them)')
-    parser.add_argument('--name', metavar='NAME', nargs='+',
-                        help='names of the chains (default: those of the tips)')
-    parser.add_argument('--convention', metavar='{standard,modified}', default='standard',
-                        choices=('standard', 'modified'),
-                        help="of the table: standard (the default), or modified, which is Craig's")
-    parser.add_argument('--tolerance', metavar='RAD', default=TIDY,
-                        type=options.number_between(0, 0.1, '0 to 0.1 rad'),
-                        help='what is this near to parallel or to a right angle is taken as such, '
-                             'since URDFs are rounded (default: 1e-4); 0 for an exact table')
+    parser.add_argument(
+        '--tips',
+        metavar='LINK',
+        nargs='+',
+        help="links to write a chain for (default: the iCub's legs and head, as "
+        'far as the robot has them)',
+    )
+    parser.add_argument(
+        '--name',
+        metavar='NAME',
+        nargs='+',
+        help='names of the chains (default: those of the tips)',
+    )
+    parser.add_argument(
+        '--convention',
+        metavar='{standard,modified}',
+        default='standard',
+        choices=('standard', 'modified'),
+        help="of the table: standard (the default), or modified, which is Craig's",
+    )
+    parser.add_argument(
+        '--tolerance',
+        metavar='RAD',
+        default=TIDY,
+        type=options.number_between(0, 0.1, '0 to 0.1 rad'),
+        help='what is this near to parallel or to a right angle is taken as such, '
+        'since URDFs are rounded (default: 1e-4); 0 for an exact table',
+    )
     options.add_output(parser, 'file to write (default: standard output)')
 
 
@@ -78,8 +97,11 @@ def _chains(catalog: Catalog, args: argparse.Namespace) -> list[Chain]:
     tips = args.tips or catalog.known()
     if not tips:
         options.refuse_no_chains(catalog)
-        raise InputFileError(args.urdf, "has none of the iCub's chains; give --tips, such as "
-                             f'{" ".join(catalog.chains)}')
+        raise InputFileError(
+            args.urdf,
+            "has none of the iCub's chains; give --tips, such as "
+            f'{" ".join(catalog.chains)}',
+        )
     chains = []
     for name, tip in zip(_names(args.name, tips), tips, strict=True):
         chain = replace(catalog.chain(tip), name=name)
@@ -90,17 +112,23 @@ def _chains(catalog: Catalog, args: argparse.Namespace) -> list[Chain]:
 def _names(names: Sequence[str] | None, tips: Sequence[str]) -> Sequence[str]:
     chosen = names or tips
     if len(chosen) != len(tips) or len(set(chosen)) != len(chosen):
-        raise LegFKError(f'--name: {", ".join(chosen)}; allowed: {len(tips)} different names, one '
-                         'per tip')
+        raise LegFKError(
+            f'--name: {", ".join(chosen)}; allowed: {len(tips)} different names, one '
+            'per tip'
+        )
     return chosen
 
 
 def _comments(urdf: Urdf, tolerance: float) -> list[str]:
     robot, file = one_line(urdf.name) or 'a robot', one_line(Path(urdf.file).name)
-    comments = [f'Denavit-Hartenberg tables of {robot}, made by `leg_fk table` from {file}.']
+    comments = [
+        f'Denavit-Hartenberg tables of {robot}, made by `leg_fk table` from {file}.'
+    ]
     if tolerance:
-        comments.append(f'What is within {tolerance:g} rad of parallel or of a right angle was '
-                        'taken as such.')
+        comments.append(
+            f'What is within {tolerance:g} rad of parallel or of a right angle was '
+            'taken as such.'
+        )
     return comments
 
 
@@ -112,8 +140,9 @@ def _read_back(text: str, urdf_file: str) -> Catalog:
         try:
             return Catalog.load(file)
         except CatalogError as error:
-            raise InputFileError(urdf_file, 'cannot be written as a kinematics file: '
-                                 f'{error.fault}') from error
+            raise InputFileError(
+                urdf_file, f'cannot be written as a kinematics file: {error.fault}'
+            ) from error
 
 
 def _report(chain: Chain, urdf: Urdf, tolerance: float) -> list[str]:
@@ -125,12 +154,18 @@ def _report(chain: Chain, urdf: Urdf, tolerance: float) -> list[str]:
         found.append(difference(chain.with_frame(frame).forward, robot, positions))
     mm, deg = max(row.mm for row in found), max(row.deg for row in found)
     frames = ', '.join(chain.tip_frames)
-    lines = [f'{chain.name} (frames: {frames}): {chain.n} joint{"s" * (chain.n != 1)}; largest '
-             f'difference from the URDF in {_SAMPLES} postures: {mm:.4f} mm, {deg:.4f} deg']
+    lines = [
+        f'{chain.name} (frames: {frames}): {chain.n} joint{"s" * (chain.n != 1)}; largest '
+        f'difference from the URDF in {_SAMPLES} postures: {mm:.4f} mm, {deg:.4f} deg'
+    ]
     for one, two, angle in almost_parallel(urdf, root, chain.frame_id, tolerance):
-        lines.append(f'  taken as parallel: the axes of {one} and {two}, {angle:.1g} rad apart')
+        lines.append(
+            f'  taken as parallel: the axes of {one} and {two}, {angle:.1g} rad apart'
+        )
     added = sum(link.is_fixed for link in chain.links)
     if added:
-        lines.append(f'  {added} fixed row{"s" * (added != 1)} between axes that are almost '
-                     'parallel')
+        lines.append(
+            f'  {added} fixed row{"s" * (added != 1)} between axes that are almost '
+            'parallel'
+        )
     return lines

@@ -24,8 +24,11 @@ examples:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     options.add(parser, 'chains')
-    parser.add_argument('--name', metavar='NAME',
-                        help='name of the robot (default: icub, or that of your file)')
+    parser.add_argument(
+        '--name',
+        metavar='NAME',
+        help='name of the robot (default: icub, or that of your file)',
+    )
     options.add(parser, '--version', '--kinematics-file', '--root')
     options.add_output(parser, 'file to write (default: standard output)')
 
@@ -57,8 +60,12 @@ def _chosen_chains(catalog: Catalog, args: argparse.Namespace) -> tuple[Chain, .
     options.refuse_no_chains(catalog)
     first = next(iter(catalog.chains))
     version = args.version or catalog.chain(first).version
-    names = [name for name, entry in catalog.chains.items() if version in entry.versions]
+    names = [
+        name for name, entry in catalog.chains.items() if version in entry.versions
+    ]
     if not names:
-        versions = [known for entry in catalog.chains.values() for known in entry.versions]
+        versions = [
+            known for entry in catalog.chains.values() for known in entry.versions
+        ]
         raise UnknownNameError('version', version, dict.fromkeys(versions))
     return catalog.select(names, version)

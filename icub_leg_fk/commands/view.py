@@ -37,23 +37,44 @@ _EVERY_ADDRESS = ('0.0.0.0', '::')
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument('chains', metavar='CHAIN', nargs='*',
-                        help='chains, such as left_leg or head_imu=v2 (default: both legs)')
+    parser.add_argument(
+        'chains',
+        metavar='CHAIN',
+        nargs='*',
+        help='chains, such as left_leg or head_imu=v2 (default: both legs)',
+    )
     options.add(parser, '--version', '--foot-frame', '--kinematics-file')
     source = parser.add_mutually_exclusive_group()
-    source.add_argument('--recording', metavar='FILE', type=Path,
-                        help='play a bag or a CSV file')
-    source.add_argument('--live', action='store_true',
-                        help='follow the joint states of a running robot (needs ROS 2)')
-    parser.add_argument('--joint-topic', metavar='TOPIC',
-                        help="topic of joint states: the recording's (default: /joint_states, or "
-                             f"the only one there is) or the robot's (default: {DEFAULT_TOPIC})")
-    parser.add_argument('--host', metavar='ADDRESS', default='127.0.0.1',
-                        help='address to listen at (default: 127.0.0.1, this machine only)')
-    parser.add_argument('--port', metavar='PORT', default=8080, type=_port,
-                        help='port to listen at, or the next one that is free (default: 8080)')
-    parser.add_argument('--no-browser', action='store_true',
-                        help='only print the address of the page')
+    source.add_argument(
+        '--recording', metavar='FILE', type=Path, help='play a bag or a CSV file'
+    )
+    source.add_argument(
+        '--live',
+        action='store_true',
+        help='follow the joint states of a running robot (needs ROS 2)',
+    )
+    parser.add_argument(
+        '--joint-topic',
+        metavar='TOPIC',
+        help="topic of joint states: the recording's (default: /joint_states, or "
+        f"the only one there is) or the robot's (default: {DEFAULT_TOPIC})",
+    )
+    parser.add_argument(
+        '--host',
+        metavar='ADDRESS',
+        default='127.0.0.1',
+        help='address to listen at (default: 127.0.0.1, this machine only)',
+    )
+    parser.add_argument(
+        '--port',
+        metavar='PORT',
+        default=8080,
+        type=_port,
+        help='port to listen at, or the next one that is free (default: 8080)',
+    )
+    parser.add_argument(
+        '--no-browser', action='store_true', help='only print the address of the page'
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -75,8 +96,9 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _recording(path: Path, chains: Sequence[Chain], topic: str | None
-               ) -> tuple[list[Chain], Recording]:
+def _recording(
+    path: Path, chains: Sequence[Chain], topic: str | None
+) -> tuple[list[Chain], Recording]:
     """Return the chains that a recording moves, and the recording."""
     if not path.exists():
         raise InputFileError(str(path), 'there is no such file or directory')
@@ -85,15 +107,20 @@ def _recording(path: Path, chains: Sequence[Chain], topic: str | None
     for kind, lines in (('warning', reading.warnings), ('note', reading.notes)):
         for line in lines:
             print(f'leg_fk: {kind}: {line}', file=sys.stderr)
-    recorded = [RecordedChain(track.chain, track.times, track.positions)
-                for track in reading.tracks]
+    recorded = [
+        RecordedChain(track.chain, track.times, track.positions)
+        for track in reading.tracks
+    ]
     return [track.chain for track in reading.tracks], Recording(recorded)
 
 
 def _announce(chains: Sequence[Chain], args: argparse.Namespace, port: int) -> None:
     """Print where the page is, and open it in the browser."""
     if args.port not in (0, port):
-        print(f'leg_fk: note: port {args.port} is taken, port {port} is not', file=sys.stderr)
+        print(
+            f'leg_fk: note: port {args.port} is taken, port {port} is not',
+            file=sys.stderr,
+        )
     host = f'[{args.host}]' if ':' in args.host else args.host
     if args.host in _EVERY_ADDRESS:
         host = '127.0.0.1'
@@ -101,7 +128,9 @@ def _announce(chains: Sequence[Chain], args: argparse.Namespace, port: int) -> N
     names = ', '.join(f'{chain.name}={chain.version}' for chain in chains)
     root = chains[0]
     where = f' ({", ".join(axis_names(root))})' if root.root_axes else ''
-    print(f'{names} in {root.root_frame}{where}\n{address}   (Ctrl-C ends it)', flush=True)
+    print(
+        f'{names} in {root.root_frame}{where}\n{address}   (Ctrl-C ends it)', flush=True
+    )
     if not args.no_browser and _has_display():
         webbrowser.open(address)
 
@@ -116,6 +145,8 @@ def _has_display() -> bool:
 def _port(words: str) -> int:
     value = options.number(words)
     if value not in range(_HIGHEST_PORT + 1):
-        raise argparse.ArgumentTypeError(f'found {words.strip()!r}, allowed: 1 to {_HIGHEST_PORT},'
-                                         ' or 0 for any that is free')
+        raise argparse.ArgumentTypeError(
+            f'found {words.strip()!r}, allowed: 1 to {_HIGHEST_PORT},'
+            ' or 0 for any that is free'
+        )
     return int(value)

@@ -20,7 +20,11 @@ from icub_leg_fk.errors import (
 from icub_leg_fk.kinematics.chain import Chain
 from icub_leg_fk.kinematics.frozen import Frozen
 from icub_leg_fk.kinematics.input_bytes import first_bytes
-from icub_leg_fk.kinematics.kinematics_file import ChainEntry, listed, read_kinematics_file
+from icub_leg_fk.kinematics.kinematics_file import (
+    ChainEntry,
+    listed,
+    read_kinematics_file,
+)
 from icub_leg_fk.kinematics.urdf_chains import doubts, UrdfChains
 from icub_leg_fk.kinematics.urdf_file import Urdf
 from icub_leg_fk.kinematics.yaml_fields import MAX_BYTES
@@ -46,8 +50,13 @@ class Catalog(Frozen):
     warnings: tuple[str, ...] = field(default=(), compare=False)
 
     @classmethod
-    def load(cls, path: str | Path | None = None, *, root: str | None = None,
-             tolerance: float = 0.0) -> Catalog:
+    def load(
+        cls,
+        path: str | Path | None = None,
+        *,
+        root: str | None = None,
+        tolerance: float = 0.0,
+    ) -> Catalog:
         """Read a kinematics file or a URDF, known by its content; the shipped file by default.
 
         Args:
@@ -67,11 +76,16 @@ class Catalog(Frozen):
             return cls.from_urdf(Urdf.load(path), root=root, tolerance=tolerance)
         file, chains, lines = read_kinematics_file(path or config_file(SHIPPED_FILE))
         if root:
-            lines = (*lines, f'{file}: is not a URDF; the root link {root!r} is ignored')
+            lines = (
+                *lines,
+                f'{file}: is not a URDF; the root link {root!r} is ignored',
+            )
         return cls(file, chains, lines)
 
     @classmethod
-    def from_urdf(cls, urdf: Urdf, *, root: str | None = None, tolerance: float = 0.0) -> Catalog:
+    def from_urdf(
+        cls, urdf: Urdf, *, root: str | None = None, tolerance: float = 0.0
+    ) -> Catalog:
         """Return the chains of a URDF: the shipped ones that it has, and those to its links.
 
         Args:
@@ -105,7 +119,9 @@ class Catalog(Frozen):
             raise UnknownNameError('chain', chain, self.chains, self._owner(chain))
         return self.chains[chain]
 
-    def chain(self, name: str, version: str | None = None, frame: str | None = None) -> Chain:
+    def chain(
+        self, name: str, version: str | None = None, frame: str | None = None
+    ) -> Chain:
         """Return one version of one chain, ready to compute with.
 
         Args:
@@ -124,11 +140,15 @@ class Catalog(Frozen):
         if not chosen:
             raise VersionNeededError(chain, entry.versions)
         if not isinstance(chosen, str) or chosen not in entry.versions:
-            raise UnknownNameError('version', chosen, entry.versions, of=f'chain {chain}')
+            raise UnknownNameError(
+                'version', chosen, entry.versions, of=f'chain {chain}'
+            )
         found = entry.versions[chosen]
         return found.with_frame(frame) if frame else found
 
-    def select(self, names: Iterable[str], version: str | None = None) -> tuple[Chain, ...]:
+    def select(
+        self, names: Iterable[str], version: str | None = None
+    ) -> tuple[Chain, ...]:
         """Return chains that are to be used together: published, recorded, drawn or written.
 
         Args:
@@ -147,7 +167,9 @@ class Catalog(Frozen):
         for name in names:
             chain = self._selected(name, version)
             if chain.name in chains:
-                raise LegFKError(f'chain {chain.name} is named twice; allowed: each chain once')
+                raise LegFKError(
+                    f'chain {chain.name} is named twice; allowed: each chain once'
+                )
             chains[chain.name] = chain
         if not chains:
             known = listed(self.chains) or 'none'
@@ -173,8 +195,9 @@ class Catalog(Frozen):
                 raise
             example = self.chains[name].default_version or error.choices[-1]
             advice = f'its own version is given as in {name}={example}'
-            raise UnknownNameError(error.kind, error.name, error.choices, advice, error.of
-                                   ) from error
+            raise UnknownNameError(
+                error.kind, error.name, error.choices, advice, error.of
+            ) from error
 
     def _owner(self, name: str) -> str:
         """Return whose tip or frame a name is; nothing if it is neither."""
@@ -197,8 +220,14 @@ def _shipped_chains() -> Mapping[str, ChainEntry]:
     return Catalog.load().chains
 
 
-def load_chain(name: str, version: str | None = None, *, frame: str | None = None,
-               file: str | Path | None = None, root: str | None = None) -> Chain:
+def load_chain(
+    name: str,
+    version: str | None = None,
+    *,
+    frame: str | None = None,
+    file: str | Path | None = None,
+    root: str | None = None,
+) -> Chain:
     """Return a chain of a kinematics file or URDF.
 
     Args:
@@ -235,8 +264,13 @@ def config_file(name: str) -> Path:
     for place in places:
         if (place / name).is_file():
             return place / name
-    raise CatalogError(name, 0, 'shipped configuration', 'nothing',
-                       'one of ' + ', '.join(map(str, places)))
+    raise CatalogError(
+        name,
+        0,
+        'shipped configuration',
+        'nothing',
+        'one of ' + ', '.join(map(str, places)),
+    )
 
 
 def _refuse_shared_tips(chains: Iterable[Chain]) -> None:
@@ -245,8 +279,10 @@ def _refuse_shared_tips(chains: Iterable[Chain]) -> None:
     for chain in chains:
         first = first_of.setdefault(chain.tip, chain)
         if first is not chain:
-            raise LegFKError(f'chains {first.name} and {chain.name} do not go together: the name '
-                             f'of their tips in topics is {chain.tip}')
+            raise LegFKError(
+                f'chains {first.name} and {chain.name} do not go together: the name '
+                f'of their tips in topics is {chain.tip}'
+            )
 
 
 def _holds_xml(path: str | Path) -> bool:
@@ -269,4 +305,5 @@ def _refuse_conflicting_roots(chains: Iterable[Chain]) -> None:
             raise LegFKError(
                 f'{first.name}={first.version} and {chain.name}={chain.version} do not go '
                 f'together: x, y, z of {chain.root_frame} point {", ".join(first.root_axes)} in '
-                f'the one and {", ".join(chain.root_axes)} in the other')
+                f'the one and {", ".join(chain.root_axes)} in the other'
+            )

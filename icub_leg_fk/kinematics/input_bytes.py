@@ -22,4 +22,6 @@ def first_bytes(path: str | Path, most: int) -> bytes:
             return stream.read(most)
     except (OSError, ValueError) as error:  # a ValueError for a zero byte in the path
         reason = getattr(error, 'strerror', None) or str(error)
-        raise CatalogError(shown(path), 0, '', reason.lower(), 'a readable file') from None
+        raise CatalogError(
+            shown(path), 0, '', reason.lower(), 'a readable file'
+        ) from None

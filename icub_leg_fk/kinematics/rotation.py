@@ -49,12 +49,15 @@ def matrix_to_quaternion(rotation: ArrayLike) -> Array:
     wy = R[..., 0, 2] - R[..., 2, 0]
     wz = R[..., 1, 0] - R[..., 0, 1]
     # 4 q q^T: row k is the quaternion times four times its own component k.
-    outer = np.stack([
-        np.stack([1 + r00 - r11 - r22, xy, xz, wx], axis=-1),
-        np.stack([xy, 1 - r00 + r11 - r22, yz, wy], axis=-1),
-        np.stack([xz, yz, 1 - r00 - r11 + r22, wz], axis=-1),
-        np.stack([wx, wy, wz, 1 + r00 + r11 + r22], axis=-1),
-    ], axis=-2)
+    outer = np.stack(
+        [
+            np.stack([1 + r00 - r11 - r22, xy, xz, wx], axis=-1),
+            np.stack([xy, 1 - r00 + r11 - r22, yz, wy], axis=-1),
+            np.stack([xz, yz, 1 - r00 - r11 + r22, wz], axis=-1),
+            np.stack([wx, wy, wz, 1 + r00 + r11 + r22], axis=-1),
+        ],
+        axis=-2,
+    )
     largest = np.argmax(np.diagonal(outer, axis1=-2, axis2=-1), axis=-1)
     q = np.take_along_axis(outer, largest[..., None, None], axis=-2)[..., 0, :]
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
@@ -64,10 +67,13 @@ def matrix_to_quaternion(rotation: ArrayLike) -> Array:
 def quaternion_to_matrix(quaternion: ArrayLike) -> Array:
     """Return the (3, 3) rotation of a (4,) unit quaternion x, y, z, w."""
     x, y, z, w = np.asarray(quaternion, dtype=float).tolist()
-    return np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def reference_quaternion(quaternion: ArrayLike) -> Array:
@@ -132,8 +138,10 @@ def rigid_transform(T: ArrayLike, name: str) -> Array:
         matrix = np.empty(0)
     if not is_rigid_transform(matrix):
         found = reprlib.repr(' '.join(str(T).split()))
-        raise LegFKError(f'{name} is {found}; allowed: a (4, 4) rotation and translation with '
-                         'the last row 0 0 0 1')
+        raise LegFKError(
+            f'{name} is {found}; allowed: a (4, 4) rotation and translation with '
+            'the last row 0 0 0 1'
+        )
     matrix[:3, :3] = nearest_rotation(matrix[:3, :3])
     return matrix
 
@@ -151,7 +159,9 @@ def is_rigid_transform(T: Array, tolerance: float = 1e-6) -> bool:
     if np.abs(R).max() >= 2.0:  # larger ones may overflow below
         return False
     is_orthogonal = np.allclose(R @ R.T, np.eye(3), atol=tolerance)
-    return bool(is_orthogonal and np.linalg.det(R) > 0 and np.array_equal(T[3], (0, 0, 0, 1)))
+    return bool(
+        is_orthogonal and np.linalg.det(R) > 0 and np.array_equal(T[3], (0, 0, 0, 1))
+    )
 
 
 def nearest_rotation(R: Array) -> Array:

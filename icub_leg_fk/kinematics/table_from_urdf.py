@@ -37,7 +37,9 @@ _NEARLY = 0.2  # rad; between axes that are this near a common normal may be far
 _FAR = 1.0  # m along an axis, added to five times the distance of the joints
 
 
-def chain_from_urdf(urdf: Urdf, root: str, tip: str, *, tolerance: float = 0.0) -> Chain:
+def chain_from_urdf(
+    urdf: Urdf, root: str, tip: str, *, tolerance: float = 0.0
+) -> Chain:
     """Return the chain between two links of a URDF, as a Denavit-Hartenberg table.
 
     Joints that mimic others become rows that follow them.
@@ -56,11 +58,17 @@ def chain_from_urdf(urdf: Urdf, root: str, tip: str, *, tolerance: float = 0.0) 
     frames, links = _frames_and_rows(axes, T_end, tolerance)
     name = topic_name(tip)
     return Chain(
-        name=tip, version=VERSION, root_frame=root, tip=name,
+        name=tip,
+        version=VERSION,
+        root_frame=root,
+        tip=name,
         joint_names=tuple(dict.fromkeys(axis.joint for axis in axes)),
-        links=tuple(_with_joints(links, axes)), T_root_0=_rounded(frames[0]),
-        tip_frames={name: TipFrame(tip)}, T_n_tip=_rounded(np.linalg.inv(frames[-1]) @ T_end),
-        source=Path(urdf.file).name)
+        links=tuple(_with_joints(links, axes)),
+        T_root_0=_rounded(frames[0]),
+        tip_frames={name: TipFrame(tip)},
+        T_n_tip=_rounded(np.linalg.inv(frames[-1]) @ T_end),
+        source=Path(urdf.file).name,
+    )
 
 
 def as_modified(chain: Chain) -> Chain:
@@ -68,7 +76,9 @@ def as_modified(chain: Chain) -> Chain:
     last = chain.links[-1]
     after = DHLink(a=last.a, d=0.0, alpha=last.alpha, joint_type='fixed').transform()
     links = (*chain.links[:-1], replace(last, a=0.0, alpha=0.0))
-    return replace(chain, links=links, T_n_tip=after @ chain.T_n_tip, convention='modified')
+    return replace(
+        chain, links=links, T_n_tip=after @ chain.T_n_tip, convention='modified'
+    )
 
 
 def topic_name(name: str) -> str:
@@ -77,8 +87,9 @@ def topic_name(name: str) -> str:
     return word if re.match('[A-Za-z]', word) else f'tip_{word}'
 
 
-def almost_parallel(urdf: Urdf, root: str, tip: str, tolerance: float
-                    ) -> list[tuple[str, str, float]]:
+def almost_parallel(
+    urdf: Urdf, root: str, tip: str, tolerance: float
+) -> list[tuple[str, str, float]]:
     """Return the pairs of joints whose axes are taken as parallel, and their angle [rad].
 
     Args:
@@ -114,8 +125,17 @@ def _axes(urdf: Urdf, root: str, tip: str) -> tuple[list[_Axis], Array]:
     for joint in urdf.path(root, tip):
         T = T @ joint.origin
         if joint.moves:
-            axes.append(_Axis(joint.kind, T[:3, :3] @ joint.axis, T[:3, 3].copy(),
-                              joint.moved_by, joint.gain, joint.lower, joint.upper))
+            axes.append(
+                _Axis(
+                    joint.kind,
+                    T[:3, :3] @ joint.axis,
+                    T[:3, 3].copy(),
+                    joint.moved_by,
+                    joint.gain,
+                    joint.lower,
+                    joint.upper,
+                )
+            )
             T = T @ joint.motion(np.array([joint.offset]))[0]
     if not axes:
         raise InputFileError(urdf.file, f'no joint moves between {root!r} and {tip!r}')
@@ -140,8 +160,9 @@ def _with_joints(links: Sequence[DHLink], axes: Sequence[_Axis]) -> list[DHLink]
     return rows
 
 
-def _frames_and_rows(axes: Sequence[_Axis], T_end: Array, tolerance: float
-                     ) -> tuple[list[Array], list[DHLink]]:
+def _frames_and_rows(
+    axes: Sequence[_Axis], T_end: Array, tolerance: float
+) -> tuple[list[Array], list[DHLink]]:
     """Place the frames one after the other and read the rows off them (steps 2 to 5)."""
     frames = [_first_frame(axes)]
     links: list[DHLink] = []
@@ -159,7 +180,9 @@ def _frames_and_rows(axes: Sequence[_Axis], T_end: Array, tolerance: float
     return frames, links
 
 
-def _frames_on(frame: Array, axis: _Axis, following: _Axis, tolerance: float) -> list[Array]:
+def _frames_on(
+    frame: Array, axis: _Axis, following: _Axis, tolerance: float
+) -> list[Array]:
     """Return the frame on the next joint's axis, after one across if that axis is awkward."""
     # Of a slide only the direction counts; its line may pass where the frame before it is.
     start, z = frame[:3, 3], following.direction
@@ -193,7 +216,7 @@ def _first_frame(axes: Sequence[_Axis]) -> Array:
     if len(axes) > 1 and axes[1].kind == axes[0].kind == 'revolute':
         normal = np.cross(z, axes[1].direction)
         sine_squared = float(normal @ normal)
-        if sine_squared > _NEARLY ** 2:
+        if sine_squared > _NEARLY**2:
             moment = np.cross(axes[1].point - origin, axes[1].direction)
             along = float(moment @ normal) / sine_squared
             if abs(along) < _FAR:
@@ -207,15 +230,17 @@ def _foot(start: Array, point: Array, z: Array) -> Array:
     return np.asarray(point + z * (z @ (start - point)))
 
 
-def _is_far(frame: Array, z: Array, point: Array, tolerance: float, reach: float) -> bool:
+def _is_far(
+    frame: Array, z: Array, point: Array, tolerance: float, reach: float
+) -> bool:
     """Return whether the common normal of almost parallel axes is farther away than a reach."""
     z0, start = frame[:3, 2], frame[:3, 3]
     normal = np.cross(z0, z)
     sine = float(np.linalg.norm(normal))
     if not tolerance < sine < _NEARLY:
         return False
-    along = float(np.cross(point - start, z) @ normal) / sine ** 2
-    along_next = float(np.cross(point - start, z0) @ normal) / sine ** 2
+    along = float(np.cross(point - start, z) @ normal) / sine**2
+    along_next = float(np.cross(point - start, z0) @ normal) / sine**2
     is_apart = float(np.linalg.norm(_foot(start, point, z) - start)) > _EXACT
     return is_apart and max(abs(along), abs(along_next)) > reach
 
@@ -233,7 +258,9 @@ def _next_frame(frame: Array, z: Array, point: Array, tolerance: float) -> Array
             return _frame(x0, z, start)
         return _frame(x, z, origin)
     normal /= sine
-    along = float(np.cross(point - start, z0) @ normal) / sine  # from the point to the normal
+    along = (
+        float(np.cross(point - start, z0) @ normal) / sine
+    )  # from the point to the normal
     origin = point + along * z
     a = float((origin - start) @ normal)
     if abs(a) < _EXACT:  # they cross: the x nearer to the one before
@@ -251,9 +278,13 @@ def _row(before: Array, after: Array, kind: str, tolerance: float) -> DHLink:
     alpha = math.atan2(T[2, 1], T[2, 2])
     shortest = _SHORT if tolerance else _EXACT
     apart = max(tolerance, _EXACT)
-    return DHLink(a=_clean_length(a, shortest), d=_clean_length(T[2, 3], shortest),
-                  alpha=_clean_angle(alpha, apart), offset=_clean_angle(theta, apart),
-                  joint_type=kind)
+    return DHLink(
+        a=_clean_length(a, shortest),
+        d=_clean_length(T[2, 3], shortest),
+        alpha=_clean_angle(alpha, apart),
+        offset=_clean_angle(theta, apart),
+        joint_type=kind,
+    )
 
 
 def _clean_length(length: float, shortest: float) -> float:

@@ -17,7 +17,10 @@ import numpy as np
 _SAME_AXES = 0.1  # rad
 _LARGEST_ANGLE = 2 * math.pi + 1e-3  # rad
 _LARGEST_LENGTH = 10.0  # m
-_LIMIT_IN_DEGREES = (4 * math.pi + 1e-3, 720.0)  # whole numbers between are hardly radians
+_LIMIT_IN_DEGREES = (
+    4 * math.pi + 1e-3,
+    720.0,
+)  # whole numbers between are hardly radians
 
 
 class UrdfChains(Mapping[str, ChainEntry]):
@@ -35,8 +38,13 @@ class UrdfChains(Mapping[str, ChainEntry]):
         tolerance: see `chain_from_urdf`; 0 for exact tables.
     """
 
-    def __init__(self, urdf: Urdf, root: str, known: Mapping[str, ChainEntry],
-                 tolerance: float = 0.0) -> None:
+    def __init__(
+        self,
+        urdf: Urdf,
+        root: str,
+        known: Mapping[str, ChainEntry],
+        tolerance: float = 0.0,
+    ) -> None:
         self._urdf = urdf
         self._root = root
         self._known = dict(known)
@@ -68,7 +76,9 @@ class UrdfChains(Mapping[str, ChainEntry]):
         if frames:
             chain = self._known_chain(name, frames)
         elif name in self._urdf.links:
-            chain = chain_from_urdf(self._urdf, self._root, name, tolerance=self._tolerance)
+            chain = chain_from_urdf(
+                self._urdf, self._root, name, tolerance=self._tolerance
+            )
         else:
             raise KeyError(name)
         return ChainEntry(name, chain.tip, {VERSION: chain}, VERSION)
@@ -76,9 +86,13 @@ class UrdfChains(Mapping[str, ChainEntry]):
     def _known_chain(self, name: str, frames: Mapping[str, TipFrame]) -> Chain:
         """Return a known chain with the robot's own geometry."""
         first = next(iter(frames.values()))
-        chain = chain_from_urdf(self._urdf, self._root, first.frame_id, tolerance=self._tolerance)
-        at_zero = {frame: self._urdf.forward(self._root, tip_frame.frame_id, {})[0]
-                   for frame, tip_frame in frames.items()}
+        chain = chain_from_urdf(
+            self._urdf, self._root, first.frame_id, tolerance=self._tolerance
+        )
+        at_zero = {
+            frame: self._urdf.forward(self._root, tip_frame.frame_id, {})[0]
+            for frame, tip_frame in frames.items()
+        }
         T_tip = np.linalg.inv(at_zero[next(iter(frames))])
         tip_frames = {}
         for frame, tip_frame in frames.items():
@@ -87,8 +101,13 @@ class UrdfChains(Mapping[str, ChainEntry]):
             is_flat = angle_between(T[:3, :3], expected[:3, :3]) < _SAME_AXES
             outline = tip_frame.outline if is_flat else None
             tip_frames[frame] = TipFrame(tip_frame.frame_id, T, outline)
-        return replace(chain, name=name, tip=self._known[name].tip, tip_frames=tip_frames,
-                       frame=next(iter(tip_frames)))
+        return replace(
+            chain,
+            name=name,
+            tip=self._known[name].tip,
+            tip_frames=tip_frames,
+            frame=next(iter(tip_frames)),
+        )
 
     def _known_frames(self, name: str) -> dict[str, TipFrame]:
         """Return the tip frames of a known chain that the robot has, all on one body."""
@@ -149,13 +168,20 @@ def _doubts_of_joint(joint: JointElement) -> dict[str, str]:
         found['rpy'] = f'an rpy of {rpy} is unlikely; it is in rad'
     if any(abs(length) > _LARGEST_LENGTH for length in _numbers(xyz)):
         found['xyz'] = f'an xyz of {xyz} is unlikely; it is in m'
-    limits = [*_numbers(joint.texts.get(('limit', 'lower'), '')),
-              *_numbers(joint.texts.get(('limit', 'upper'), ''))]
+    limits = [
+        *_numbers(joint.texts.get(('limit', 'lower'), '')),
+        *_numbers(joint.texts.get(('limit', 'upper'), '')),
+    ]
     low, high = _LIMIT_IN_DEGREES
-    in_degrees = [f'{limit:g}' for limit in limits
-                  if low < abs(limit) <= high and limit == round(limit)]
+    in_degrees = [
+        f'{limit:g}'
+        for limit in limits
+        if low < abs(limit) <= high and limit == round(limit)
+    ]
     if joint.kind == 'revolute' and in_degrees:
-        found['limit'] = f'a limit of {" and ".join(in_degrees)} is unlikely; it is in rad'
+        found['limit'] = (
+            f'a limit of {" and ".join(in_degrees)} is unlikely; it is in rad'
+        )
     return found
 
 

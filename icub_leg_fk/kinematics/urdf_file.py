@@ -120,7 +120,9 @@ class Urdf:
         file = shown(path)
         data = first_bytes(path, _LARGEST_FILE + 1)
         if len(data) > _LARGEST_FILE:
-            raise InputFileError(file, f'has more than {_LARGEST_FILE} bytes; a URDF is smaller')
+            raise InputFileError(
+                file, f'has more than {_LARGEST_FILE} bytes; a URDF is smaller'
+            )
         return cls.parse(data, file)
 
     @classmethod
@@ -137,19 +139,27 @@ class Urdf:
         robot = robot_element(data, file)
         version = robot.get('version', '1.0')
         if version not in _VERSIONS:
-            raise InputFileError(file, f'is a URDF of version {version[:20]!r}; allowed: '
-                                       f'{", ".join(_VERSIONS)}')
+            raise InputFileError(
+                file,
+                f'is a URDF of version {version[:20]!r}; allowed: '
+                f'{", ".join(_VERSIONS)}',
+            )
         links, joints = [], []
         for element in robot:
             if tag(element) == 'link':
                 links.append(element.get('name', ''))
             elif tag(element) == 'joint':
                 joints.append(_joint_element(element))
-        for kind, names in (('link', links), ('joint', [joint.name for joint in joints])):
+        for kind, names in (
+            ('link', links),
+            ('joint', [joint.name for joint in joints]),
+        ):
             again = _first_again(names)
             if again is not None:
-                raise InputFileError(file, f'has two {kind}s of the name {again!r}; allowed: each '
-                                           f'{kind} once')
+                raise InputFileError(
+                    file,
+                    f'has two {kind}s of the name {again!r}; allowed: each {kind} once',
+                )
         return cls(file, robot.get('name', ''), tuple(links), tuple(joints))
 
     def root(self) -> str:
@@ -166,8 +176,10 @@ class Urdf:
         tops = [link for link in self.links if link not in children]
         if len(tops) != 1:
             shown = ', '.join(tops[:_MOST_ENDS]) or 'none'
-            self._fail(f'has {len(tops)} links at the top ({shown}); allowed: one, or a root link '
-                       'that is named')
+            self._fail(
+                f'has {len(tops)} links at the top ({shown}); allowed: one, or a root link '
+                'that is named'
+            )
         return tops[0]
 
     def ends(self) -> tuple[str, ...]:
@@ -186,7 +198,10 @@ class Urdf:
         ends = self.ends()[:_MOST_ENDS]
         guess = closest(link, self.links)
         if guess is None:
-            guess = next((name for name in self.links if link.casefold() in name.casefold()), None)
+            guess = next(
+                (name for name in self.links if link.casefold() in name.casefold()),
+                None,
+            )
         advice = f'did you mean {guess!r}?' if guess and guess not in ends else ''
         raise UnknownNameError('link', link, ends, advice, of=self.file)
 
@@ -207,16 +222,20 @@ class Urdf:
         up = [] if passed[-1] == root else self._way_up(root, {*passed})
         turn = up[-1].parent if up else root
         if turn not in passed:
-            self._fail(f'link {tip!r} is not below {root!r}; above it is {passed[-1]!r}')
+            self._fail(
+                f'link {tip!r} is not below {root!r}; above it is {passed[-1]!r}'
+            )
         path = []
         for element in up:
             joint = self._checked(element)
             if joint.kind != 'fixed':
-                self._fail(f'link {tip!r} is not below {root!r}, and joint {joint.name!r} above '
-                           f'{root!r} moves')
+                self._fail(
+                    f'link {tip!r} is not below {root!r}, and joint {joint.name!r} above '
+                    f'{root!r} moves'
+                )
             origin = np.asarray(np.linalg.inv(joint.origin))
             path.append(joint._replace(origin=origin))
-        for element in reversed(down[:passed.index(turn)]):
+        for element in reversed(down[: passed.index(turn)]):
             path.append(self._checked(element))
         return tuple(path)
 
@@ -263,8 +282,10 @@ class Urdf:
         while link in self._joints_above and link not in ends:
             above = self._joints_above[link]
             if len(above) > 1:
-                self._fail(f'link {link!r} has two parents, joints {above[0].name!r} and '
-                           f'{above[1].name!r}; a URDF is a tree')
+                self._fail(
+                    f'link {link!r} has two parents, joints {above[0].name!r} and '
+                    f'{above[1].name!r}; a URDF is a tree'
+                )
             way.append(above[0])
             link = above[0].parent
             if link in passed:
@@ -284,13 +305,19 @@ class Urdf:
 
     def _read(self, joint: JointElement) -> UrdfJoint:
         if joint.kind not in (*MOVING, 'fixed'):
-            self._fail(f'joint {joint.name!r} is {joint.kind or "of no type"}; allowed: revolute, '
-                       'continuous, prismatic, fixed')
+            self._fail(
+                f'joint {joint.name!r} is {joint.kind or "of no type"}; allowed: revolute, '
+                'continuous, prismatic, fixed'
+            )
         for link in (joint.parent, joint.child):
             if link not in self._links:
-                self._fail(f'joint {joint.name!r} names the link {link!r}, which is not there')
+                self._fail(
+                    f'joint {joint.name!r} names the link {link!r}, which is not there'
+                )
         if not joint.name:
-            self._fail(f'the joint from {joint.parent!r} to {joint.child!r} has no name')
+            self._fail(
+                f'the joint from {joint.parent!r} to {joint.child!r} has no name'
+            )
         for name in (joint.name, joint.parent, joint.child):
             if REPLACEMENT in name:
                 self._fail(f'the name {name!r} has a byte that is not UTF-8 text')
@@ -304,7 +331,9 @@ class Urdf:
             T = origin @ still.motion(np.array([offset]))[0]
             return UrdfJoint(joint.name, 'fixed', T, np.zeros(3))
         lower, upper = self._limits(master)
-        return UrdfJoint(joint.name, kind, origin, axis, master, gain, offset, lower, upper)
+        return UrdfJoint(
+            joint.name, kind, origin, axis, master, gain, offset, lower, upper
+        )
 
     def _origin(self, joint: JointElement) -> Array:
         T = np.eye(4)
@@ -312,14 +341,20 @@ class Urdf:
         if ('origin', 'quat_xyzw') not in joint.texts:
             x, y, z = np.eye(3)
             roll, pitch, yaw = self._numbers(joint, 'origin', 'rpy', '0 0 0')
-            T[:3, :3] = turns_about(z, yaw) @ turns_about(y, pitch) @ turns_about(x, roll)
+            T[:3, :3] = (
+                turns_about(z, yaw) @ turns_about(y, pitch) @ turns_about(x, roll)
+            )
             return T
         if ('origin', 'rpy') in joint.texts:
-            self._fail(f'joint {joint.name!r}: origin has rpy and quat_xyzw; allowed: one of them')
+            self._fail(
+                f'joint {joint.name!r}: origin has rpy and quat_xyzw; allowed: one of them'
+            )
         quaternion = np.array(self._numbers(joint, 'origin', 'quat_xyzw', '0 0 0 1'))
         length = float(np.linalg.norm(quaternion))
         if length < 1e-9:
-            self._fail(f'joint {joint.name!r}: origin quat_xyzw is 0 0 0 0; allowed: a rotation')
+            self._fail(
+                f'joint {joint.name!r}: origin quat_xyzw is 0 0 0 0; allowed: a rotation'
+            )
         T[:3, :3] = quaternion_to_matrix(quaternion / length)
         return T
 
@@ -342,8 +377,8 @@ class Urdf:
             joint = self._joints_by_name[name]
             if not any(element == 'mimic' for element, _ in joint.texts):
                 break
-            multiplier, = self._numbers(joint, 'mimic', 'multiplier', '1')
-            own_offset, = self._numbers(joint, 'mimic', 'offset', '0')
+            (multiplier,) = self._numbers(joint, 'mimic', 'multiplier', '1')
+            (own_offset,) = self._numbers(joint, 'mimic', 'offset', '0')
             offset += gain * own_offset
             gain *= multiplier
             name = joint.texts.get(('mimic', 'joint'), '')
@@ -358,28 +393,39 @@ class Urdf:
         joint = self._joints_by_name.get(name)
         if joint is None or joint.kind not in ('revolute', 'prismatic'):
             return -math.inf, math.inf
-        if ('limit', 'lower') not in joint.texts and ('limit', 'upper') not in joint.texts:
+        if ('limit', 'lower') not in joint.texts and (
+            'limit',
+            'upper',
+        ) not in joint.texts:
             return -math.inf, math.inf
-        lower, = self._numbers(joint, 'limit', 'lower', '0')
-        upper, = self._numbers(joint, 'limit', 'upper', '0')
+        (lower,) = self._numbers(joint, 'limit', 'lower', '0')
+        (upper,) = self._numbers(joint, 'limit', 'upper', '0')
         if lower > upper:
-            self._fail(f'joint {joint.name!r}: limit lower {lower:g} is above upper {upper:g}')
+            self._fail(
+                f'joint {joint.name!r}: limit lower {lower:g} is above upper {upper:g}'
+            )
         return lower, upper
 
-    def _numbers(self, joint: JointElement, element: str, key: str, default: str) -> list[float]:
+    def _numbers(
+        self, joint: JointElement, element: str, key: str, default: str
+    ) -> list[float]:
         """Return the numbers of an attribute, as many as its default has."""
         text = joint.texts.get((element, key), default)
         words = text.split()
         count = len(default.split())
         are_numbers = all(_NUMBER.fullmatch(word) for word in words)
         if len(words) != count or not are_numbers:
-            self._fail(f'joint {joint.name!r}: {element} {key} is {text[:60]!r}; allowed: {count} '
-                       f'finite number{"s" * (count > 1)}')
+            self._fail(
+                f'joint {joint.name!r}: {element} {key} is {text[:60]!r}; allowed: {count} '
+                f'finite number{"s" * (count > 1)}'
+            )
         values = [float(word) for word in words]
         largest = sys.float_info.max if element == 'limit' else _LARGEST
         if not all(abs(value) <= largest for value in values):
-            self._fail(f'joint {joint.name!r}: {element} {key} is {text[:60]!r}; allowed: up to '
-                       f'{largest:g}')
+            self._fail(
+                f'joint {joint.name!r}: {element} {key} is {text[:60]!r}; allowed: up to '
+                f'{largest:g}'
+            )
         return values
 
     def _fail(self, fault: str) -> NoReturn:
@@ -399,8 +445,12 @@ def _joint_element(element: etree._Element) -> JointElement:
             for key, value in part.items():
                 texts[name, key] = value
     return JointElement(
-        element.get('name', ''), element.get('type', ''), texts.get(('parent', 'link'), ''),
-        texts.get(('child', 'link'), ''), texts)
+        element.get('name', ''),
+        element.get('type', ''),
+        texts.get(('parent', 'link'), ''),
+        texts.get(('child', 'link'), ''),
+        texts,
+    )
 
 
 def _first_again(names: list[str]) -> str | None:

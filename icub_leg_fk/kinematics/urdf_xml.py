@@ -40,8 +40,14 @@ def robot_element(data: bytes, file: str) -> etree._Element:
         InputFileError: it is not a URDF, or its XML is malformed in a way that is not forgiven.
     """
     text = _text(data, file)
-    parser = etree.XMLParser(recover=True, resolve_entities=False, no_network=True,
-                             load_dtd=False, remove_comments=True, remove_pis=True)
+    parser = etree.XMLParser(
+        recover=True,
+        resolve_entities=False,
+        no_network=True,
+        load_dtd=False,
+        remove_comments=True,
+        remove_pis=True,
+    )
     try:
         robot = etree.fromstring(text.encode(), parser)
     except (etree.XMLSyntaxError, ValueError) as error:
@@ -112,29 +118,41 @@ def _newlines(found: re.Match[str]) -> str:
 def _echoed(data: bytes, file: str) -> str:
     """Return the text of a message that `ros2 topic echo` has printed as YAML."""
     try:
-        documents = yaml.load_all(data, Loader=getattr(yaml, 'CBaseLoader', yaml.BaseLoader))
+        documents = yaml.load_all(
+            data, Loader=getattr(yaml, 'CBaseLoader', yaml.BaseLoader)
+        )
         text = next(documents)['data']
     except (yaml.YAMLError, KeyError, TypeError):
-        raise InputFileError(file, 'is not a URDF, nor one that ros2 topic echo prints') from None
+        raise InputFileError(
+            file, 'is not a URDF, nor one that ros2 topic echo prints'
+        ) from None
     if len(text) < _CUT_OFF and text.endswith('...'):
-        raise InputFileError(file, 'is cut off; this prints all of it: ros2 topic echo --once '
-                                   '--full-length /robot_description')
+        raise InputFileError(
+            file,
+            'is cut off; this prints all of it: ros2 topic echo --once '
+            '--full-length /robot_description',
+        )
     return str(text)
 
 
 def _refuse_other_formats(robot: etree._Element, file: str) -> None:
     for element in robot.iter(etree.Element):
         if tag(element).startswith('xacro:'):
-            raise InputFileError(file, 'is a xacro file; this makes a URDF of it: xacro '
-                                       f'{file} > robot.urdf')
+            raise InputFileError(
+                file,
+                f'is a xacro file; this makes a URDF of it: xacro {file} > robot.urdf',
+            )
     if tag(robot) != 'robot':
-        raise InputFileError(file, f'is not a URDF: its root is <{tag(robot)[:60]}>; allowed: '
-                                   '<robot>')
+        raise InputFileError(
+            file, f'is not a URDF: its root is <{tag(robot)[:60]}>; allowed: <robot>'
+        )
 
 
 def _refuse_mark(text: str, mark: str, name: str, file: str) -> None:
     if mark in text:
-        _refuse(file, text.count('\n', 0, text.index(mark)) + 1, f'{name} in the document')
+        _refuse(
+            file, text.count('\n', 0, text.index(mark)) + 1, f'{name} in the document'
+        )
 
 
 def _refuse(file: str, line: int, fault: str) -> NoReturn:

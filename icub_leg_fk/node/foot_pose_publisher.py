@@ -21,8 +21,11 @@ START_ERRORS = (ParameterException, NameValidationException, RuntimeError)
 _QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 """SensorDataQoS, but deep enough for a pause at 1 kHz in which a description is read."""
 
-_DESCRIPTION_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
-                              durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_DESCRIPTION_QOS = QoSProfile(
+    depth=1,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
 """As robot_state_publisher sends it: the last one comes, however late one listens."""
 
 
@@ -39,30 +42,48 @@ class FootPosePublisher(Node):
         self._input = JointInput(lambda: self.get_clock().now().nanoseconds)
         self._outputs = Outputs(self)
         self._joint_states = self.create_subscription(
-            JointState, 'joint_states', self._take, _QOS, raw=True,
-            qos_overriding_options=OVERRIDABLE)
+            JointState,
+            'joint_states',
+            self._take,
+            _QOS,
+            raw=True,
+            qos_overriding_options=OVERRIDABLE,
+        )
         descriptions = self.create_subscription(
-            String, 'robot_description', self._take_description, _DESCRIPTION_QOS, raw=True)
+            String,
+            'robot_description',
+            self._take_description,
+            _DESCRIPTION_QOS,
+            raw=True,
+        )
         use = None
         if self._node_parameters.description_is_source:
             use = self._node_parameters.use
         self._description = Description(descriptions.topic_name, use)
-        self._health = Health(self, self._input, self._joint_states.topic_name, self._description)
+        self._health = Health(
+            self, self._input, self._joint_states.topic_name, self._description
+        )
         self._apply(self._node_parameters.configuration)
         self._health.say_announcement()
 
     def _apply(self, configuration: Configuration) -> None:
         """Begin to work as configured, with the joints that are already known."""
-        self._input.configure(configuration.chains, configuration.joint_timeout,
-                              configuration.publish_twist)
+        self._input.configure(
+            configuration.chains,
+            configuration.joint_timeout,
+            configuration.publish_twist,
+        )
         self._outputs.configure(configuration)
         self._description.configure(configuration)
         self._health.configure(configuration)
         self._announce()
 
     def _announce(self) -> None:
-        notes = _announcement(self._node_parameters.configuration, self._joint_states.topic_name,
-                              self._description.topic)
+        notes = _announcement(
+            self._node_parameters.configuration,
+            self._joint_states.topic_name,
+            self._description.topic,
+        )
         self._health.announce(notes + self._description.announcement())
 
     def _take(self, data: bytes) -> None:
@@ -78,7 +99,9 @@ class FootPosePublisher(Node):
         self._health.say_announcement()
 
 
-def _announcement(configuration: Configuration, topic: str, description_topic: str) -> list[Note]:
+def _announcement(
+    configuration: Configuration, topic: str, description_topic: str
+) -> list[Note]:
     """Return what there is to say of a configuration.
 
     Args:
@@ -89,8 +112,10 @@ def _announcement(configuration: Configuration, topic: str, description_topic: s
     notes = [Note('kinematics', '', WARNING, text) for text in configuration.warnings]
     kinds = _kinds(configuration)
     if configuration.awaited:
-        doing = (f'waiting for the description of the robot on {description_topic} to publish '
-                 f'{kinds} of {", ".join(configuration.awaited)}')
+        doing = (
+            f'waiting for the description of the robot on {description_topic} to publish '
+            f'{kinds} of {", ".join(configuration.awaited)}'
+        )
     else:
         doing = f'publishing {kinds} of {_chains(configuration)}'
     texts = [*configuration.notes, f'{doing}; joint states from {topic}']

@@ -24,7 +24,11 @@ from icub_leg_fk.stream.configuration import (
     LONGEST_TIMEOUT,
     STAMP_SOURCES,
 )
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
 from rclpy.exceptions import ParameterException, ParameterUninitializedException
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RclpyParameter
@@ -51,47 +55,106 @@ class Parameter(NamedTuple):
 
     def descriptor(self) -> ParameterDescriptor:
         """Return what `ros2 param describe` shows."""
-        descriptor = ParameterDescriptor(description=self.description, read_only=not self.is_live,
-                                         additional_constraints=self.allowed)
+        descriptor = ParameterDescriptor(
+            description=self.description,
+            read_only=not self.is_live,
+            additional_constraints=self.allowed,
+        )
         if self.largest is not None:
             descriptor.floating_point_range = [
-                FloatingPointRange(from_value=0.0, to_value=self.largest, step=0.0)]
+                FloatingPointRange(from_value=0.0, to_value=self.largest, step=0.0)
+            ]
         return descriptor
 
 
 _YES_OR_NO = 'true or false'
 PARAMETERS = (
-    Parameter('chains', list(LEGS), 'Chains whose tip poses are published.',
-              'a list of chains, each once and with its version if need be, such as '
-              '[left_leg, head_imu=v2]', is_live=False),
-    Parameter('version', '', 'Version of every chain that is named without one; empty: the '
-              "file's default.", 'a version of the kinematics file, such as v2_5; leg_fk list '
-              'shows them'),
-    Parameter('kinematics_file', '', 'Kinematics file or URDF to read; empty: the shipped one.',
-              'path of a file; ~ is your home', is_live=False),
-    Parameter('description_from_topic', False, "Compute with the running robot's URDF, which "
-              'robot_state_publisher sends on robot_description.',
-              'true or false; true without kinematics_file', is_live=False),
-    Parameter('root_frame', '', 'Root link, where the kinematics come from a URDF; empty: '
-              'root_link, or else the top.', 'a link of the URDF', is_live=False),
-    Parameter('joint_prefix', '', 'Put before every joint name that is looked for, such as '
-              'icub1/.', 'printable characters', is_live=False),
-    Parameter('foot_frame', DEFAULT_FRAME, "Axes of the tip: the table's last frame, or the sole.",
-              'a tip frame of the kinematics file, such as dh or sole'),
-    Parameter('frame_prefix', '', 'Put before every frame id, such as icub1/.',
-              'printable, no space, no leading slash'),
-    Parameter('joint_timeout', DEFAULT_TIMEOUT, 'How far a joint may lag the newest of its chain '
-              'before the chain is held back [s]; 0.0 turns this off.',
-              f'a number with a decimal point from 0.0 to {LONGEST_TIMEOUT:.0f}.0',
-              LONGEST_TIMEOUT),
-    Parameter('stamp_source', STAMP_SOURCES[0], "Stamp of the poses: the message's, or the node's "
-              "time; a zero message stamp always becomes the node's time.",
-              ' or '.join(STAMP_SOURCES)),
-    Parameter('publish_tf', False, 'Also broadcast the poses on /tf (needs tf2_msgs).',
-              _YES_OR_NO),
-    Parameter('publish_twist', False, 'Also publish the velocity of the tips.', _YES_OR_NO),
-    Parameter('publish_markers', False, 'Also publish the skeletons for RViz and Foxglove.',
-              _YES_OR_NO),
+    Parameter(
+        'chains',
+        list(LEGS),
+        'Chains whose tip poses are published.',
+        'a list of chains, each once and with its version if need be, such as '
+        '[left_leg, head_imu=v2]',
+        is_live=False,
+    ),
+    Parameter(
+        'version',
+        '',
+        "Version of every chain that is named without one; empty: the file's default.",
+        'a version of the kinematics file, such as v2_5; leg_fk list shows them',
+    ),
+    Parameter(
+        'kinematics_file',
+        '',
+        'Kinematics file or URDF to read; empty: the shipped one.',
+        'path of a file; ~ is your home',
+        is_live=False,
+    ),
+    Parameter(
+        'description_from_topic',
+        False,
+        "Compute with the running robot's URDF, which "
+        'robot_state_publisher sends on robot_description.',
+        'true or false; true without kinematics_file',
+        is_live=False,
+    ),
+    Parameter(
+        'root_frame',
+        '',
+        'Root link, where the kinematics come from a URDF; empty: '
+        'root_link, or else the top.',
+        'a link of the URDF',
+        is_live=False,
+    ),
+    Parameter(
+        'joint_prefix',
+        '',
+        'Put before every joint name that is looked for, such as icub1/.',
+        'printable characters',
+        is_live=False,
+    ),
+    Parameter(
+        'foot_frame',
+        DEFAULT_FRAME,
+        "Axes of the tip: the table's last frame, or the sole.",
+        'a tip frame of the kinematics file, such as dh or sole',
+    ),
+    Parameter(
+        'frame_prefix',
+        '',
+        'Put before every frame id, such as icub1/.',
+        'printable, no space, no leading slash',
+    ),
+    Parameter(
+        'joint_timeout',
+        DEFAULT_TIMEOUT,
+        'How far a joint may lag the newest of its chain '
+        'before the chain is held back [s]; 0.0 turns this off.',
+        f'a number with a decimal point from 0.0 to {LONGEST_TIMEOUT:.0f}.0',
+        LONGEST_TIMEOUT,
+    ),
+    Parameter(
+        'stamp_source',
+        STAMP_SOURCES[0],
+        "Stamp of the poses: the message's, or the node's "
+        "time; a zero message stamp always becomes the node's time.",
+        ' or '.join(STAMP_SOURCES),
+    ),
+    Parameter(
+        'publish_tf',
+        False,
+        'Also broadcast the poses on /tf (needs tf2_msgs).',
+        _YES_OR_NO,
+    ),
+    Parameter(
+        'publish_twist', False, 'Also publish the velocity of the tips.', _YES_OR_NO
+    ),
+    Parameter(
+        'publish_markers',
+        False,
+        'Also publish the skeletons for RViz and Foxglove.',
+        _YES_OR_NO,
+    ),
 )
 _OF_THE_CATALOG = ('kinematics_file', 'description_from_topic', 'root_frame')
 _RCLPYS_OWN = ('use_sim_time', 'start_type_description_service')
@@ -148,8 +211,10 @@ class NodeParameters:
         if not self.description_is_source:
             return self._read_from_root(lambda root: load_catalog(file, root))
         if file:
-            raise ParameterError('description_from_topic', 'found true beside kinematics_file '
-                                 f'{file!r}; allowed: one of them')
+            raise ParameterError(
+                'description_from_topic',
+                f'found true beside kinematics_file {file!r}; allowed: one of them',
+            )
         return None
 
     def _read_from_root(self, read: Callable[[str], Catalog]) -> Catalog:
@@ -164,15 +229,21 @@ class NodeParameters:
             if 'root_frame' in self._given:
                 raise ParameterError('root_frame', str(error)) from error
             catalog = read('')
-            return replace(catalog, warnings=(*catalog.warnings, f'root_frame not used: {error}'))
+            return replace(
+                catalog, warnings=(*catalog.warnings, f'root_frame not used: {error}')
+            )
 
     def _declare(self, parameter: Parameter) -> None:
         name = parameter.name
         try:
-            self._node.declare_parameter(name, parameter.default, parameter.descriptor())
+            self._node.declare_parameter(
+                name, parameter.default, parameter.descriptor()
+            )
         except ParameterException as error:
             found = self._overrides[name].value
-            raise ParameterError(name, f'found {found!r}, allowed: {parameter.allowed}') from error
+            raise ParameterError(
+                name, f'found {found!r}, allowed: {parameter.allowed}'
+            ) from error
 
     def _check_unknown(self) -> None:
         """Look at what rclpy passes over: parameters that the node does not have, and bad QoS.
@@ -183,8 +254,12 @@ class NodeParameters:
         ignored = self._unknown()
         log = self._node.get_logger()
         if ignored:
-            log.warning(f'ignored parameters that this node does not have: {", ".join(ignored)}')
-        for line in files_for_others(self._arguments, self._node.get_fully_qualified_name()):
+            log.warning(
+                f'ignored parameters that this node does not have: {", ".join(ignored)}'
+            )
+        for line in files_for_others(
+            self._arguments, self._node.get_fully_qualified_name()
+        ):
             log.warning(line)
 
     def _unknown(self) -> list[str]:
@@ -210,7 +285,10 @@ class NodeParameters:
     def _roles(self) -> dict[str, str]:
         """Return `publisher` or `subscription` by full name of each topic whose QoS can change."""
         resolve = self._node.resolve_topic_name
-        roles = {resolve('joint_states'): 'subscription', resolve('~/skeleton'): 'publisher'}
+        roles = {
+            resolve('joint_states'): 'subscription',
+            resolve('~/skeleton'): 'publisher',
+        }
         for tip in self._tips():
             for kind in ('pose', 'twist'):
                 roles[resolve(f'~/{tip}/{kind}')] = 'publisher'
@@ -235,14 +313,18 @@ class NodeParameters:
     def _value(self, name: str) -> Any:
         try:
             return self._node.get_parameter(name).value
-        except ParameterUninitializedException:  # rclpy takes an empty list for no value
+        except (
+            ParameterUninitializedException
+        ):  # rclpy takes an empty list for no value
             return ()
 
     def _check(self, changes: Sequence[RclpyParameter]) -> SetParametersResult:
         """Refuse a set of changes that gives no valid configuration; changes nothing."""
         self._candidate = None
         values = self._values()
-        ours = {change.name: change.value for change in changes if change.name in values}
+        ours = {
+            change.name: change.value for change in changes if change.name in values
+        }
         if ours:
             try:
                 self._candidate = configuration_of(self._catalog, values | ours)
@@ -269,14 +351,21 @@ def load_catalog(kinematics_file: str, root_frame: str = '') -> Catalog:
     return Catalog.load(path, root=root_frame)
 
 
-def configuration_of(catalog: Catalog | None, values: Mapping[str, Any]) -> Configuration:
+def configuration_of(
+    catalog: Catalog | None, values: Mapping[str, Any]
+) -> Configuration:
     """Return the configuration of parameter values by name.
 
     Raises:
         ParameterError: a value cannot be used.
     """
     if values['publish_tf'] and find_spec('tf2_msgs') is None:
-        raise ParameterError('publish_tf', 'found true, but tf2_msgs, which ROS 2 has, is not '
-                             'installed; allowed: false')
-    others = {name: value for name, value in values.items() if name not in _OF_THE_CATALOG}
+        raise ParameterError(
+            'publish_tf',
+            'found true, but tf2_msgs, which ROS 2 has, is not '
+            'installed; allowed: false',
+        )
+    others = {
+        name: value for name, value in values.items() if name not in _OF_THE_CATALOG
+    }
     return Configuration.checked(catalog, **others)

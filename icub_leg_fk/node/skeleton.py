@@ -18,8 +18,9 @@ _NAME_BELOW = 0.08  # m; of its middle below the tip
 _JOINT_COLOR = ColorRGBA(r=0.75, g=0.75, b=0.78, a=1.0)
 
 
-def skeleton_markers(chain: Chain, q: Sequence[float], stamp: Time, frame_prefix: str
-                     ) -> MarkerArray:
+def skeleton_markers(
+    chain: Chain, q: Sequence[float], stamp: Time, frame_prefix: str
+) -> MarkerArray:
     """Return a line through the chain's frames, a ball at each, the tip's name and the sole.
 
     Args:

@@ -71,9 +71,19 @@ def read_layout(data: bytes) -> JointStateLayout:
     names = tuple([reader.string('name') for _ in range(reader.length('name', 4))])
     names_end = reader.align(4)
     padding = tuple(reader.padding)
-    positions, velocities, efforts = map(reader.doubles, ('position', 'velocity', 'effort'))
-    return JointStateLayout(reader.byte_order, frame_id, names, padding, names_end,
-                            positions, velocities, efforts)
+    positions, velocities, efforts = map(
+        reader.doubles, ('position', 'velocity', 'effort')
+    )
+    return JointStateLayout(
+        reader.byte_order,
+        frame_id,
+        names,
+        padding,
+        names_end,
+        positions,
+        velocities,
+        efforts,
+    )
 
 
 def read_string(data: bytes) -> bytes:
@@ -151,7 +161,9 @@ class _Reader:
         self._message = message
         byte_order = BYTE_ORDERS.get(bytes(data[:2]))
         if byte_order is None:
-            self._fail(f'has the encapsulation 0x{data[:2].hex()}; allowed: 0x0000, 0x0001')
+            self._fail(
+                f'has the encapsulation 0x{data[:2].hex()}; allowed: 0x0000, 0x0001'
+            )
         self.byte_order = byte_order
         self.padding: list[tuple[int, int]] = []
         self._data = data
@@ -176,11 +188,14 @@ class _Reader:
     def length(self, field: str, item_size: int) -> int:
         """Return the count of items that follow; they fit in what is left."""
         self.align(4)
-        count: int = struct.unpack_from(f'{self.byte_order}I', self._data,
-                                        self.take(field, 4))[0]
+        count: int = struct.unpack_from(
+            f'{self.byte_order}I', self._data, self.take(field, 4)
+        )[0]
         left = len(self._data) - self._at
         if count * item_size > left:
-            self._fail(f'{field} has {count} items; allowed: what fits in the {left} bytes left')
+            self._fail(
+                f'{field} has {count} items; allowed: what fits in the {left} bytes left'
+            )
         return count
 
     def string(self, field: str) -> str:

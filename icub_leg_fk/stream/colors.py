@@ -2,7 +2,10 @@
 
 from icub_leg_fk.kinematics import Chain
 
-_SIDES = {'left': '#6a3d9a', 'right': '#e08214'}  # told apart in every kind of colour vision
+_SIDES = {
+    'left': '#6a3d9a',
+    'right': '#e08214',
+}  # told apart in every kind of colour vision
 _OTHERS = ('#00798c', '#8c6d31', '#a8437c')
 
 

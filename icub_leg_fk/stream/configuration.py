@@ -5,7 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from icub_leg_fk.errors import LegFKError, ParameterError, UnknownNameError, VersionNeededError
+from icub_leg_fk.errors import (
+    LegFKError,
+    ParameterError,
+    UnknownNameError,
+    VersionNeededError,
+)
 from icub_leg_fk.kinematics import Catalog, Chain
 from icub_leg_fk.kinematics.table_from_urdf import VERSION
 
@@ -48,11 +53,21 @@ class Configuration:
     publish_markers: bool
 
     @classmethod
-    def checked(cls, catalog: Catalog | None, *, chains: Sequence[str] = LEGS, version: str = '',
-                joint_prefix: str = '', foot_frame: str = DEFAULT_FRAME, frame_prefix: str = '',
-                joint_timeout: float = DEFAULT_TIMEOUT, stamp_source: str = STAMP_SOURCES[0],
-                publish_tf: bool = False, publish_twist: bool = False,
-                publish_markers: bool = False) -> Configuration:
+    def checked(
+        cls,
+        catalog: Catalog | None,
+        *,
+        chains: Sequence[str] = LEGS,
+        version: str = '',
+        joint_prefix: str = '',
+        foot_frame: str = DEFAULT_FRAME,
+        frame_prefix: str = '',
+        joint_timeout: float = DEFAULT_TIMEOUT,
+        stamp_source: str = STAMP_SOURCES[0],
+        publish_tf: bool = False,
+        publish_twist: bool = False,
+        publish_markers: bool = False,
+    ) -> Configuration:
         """Return the configuration of some values, which are those of the node's parameters.
 
         `version` is that of every chain which is named without one, their defaults if empty. A
@@ -86,10 +101,13 @@ class Configuration:
             stamp_now=stamp_source == 'now',
             publish_tf=publish_tf,
             publish_twist=publish_twist,
-            publish_markers=publish_markers)
+            publish_markers=publish_markers,
+        )
 
 
-def _selected(catalog: Catalog, names: Sequence[str], version: str) -> tuple[Chain, ...]:
+def _selected(
+    catalog: Catalog, names: Sequence[str], version: str
+) -> tuple[Chain, ...]:
     try:
         return catalog.select(names, version)
     except VersionNeededError as error:
@@ -104,8 +122,11 @@ def _selected(catalog: Catalog, names: Sequence[str], version: str) -> tuple[Cha
 def _check_awaited(chains: Sequence[str], version: str) -> None:
     """Refuse what no description can make good."""
     if version not in ('', VERSION):
-        raise ParameterError('version', f'found {version!r}, allowed with description_from_topic: '
-                             f'none, or {VERSION}')
+        raise ParameterError(
+            'version',
+            f'found {version!r}, allowed with description_from_topic: '
+            f'none, or {VERSION}',
+        )
     if not chains:
         raise ParameterError('chains', 'no chain is named; allowed: one or more')
 
@@ -115,8 +136,11 @@ def _refuse_shared_topics(chains: Sequence[Chain]) -> None:
     for chain in chains:
         first = first_of.setdefault(chain.tip, chain.name)
         if first != chain.name:
-            raise ParameterError('chains', f'{first} and {chain.name} have the same tip, '
-                                 f'{chain.tip}, and so the same topics')
+            raise ParameterError(
+                'chains',
+                f'{first} and {chain.name} have the same tip, '
+                f'{chain.tip}, and so the same topics',
+            )
 
 
 def _with_prefix(chain: Chain, prefix: str) -> Chain:
@@ -143,28 +167,40 @@ def _in_frame(chain: Chain, frame: str) -> Chain:
 def _notes(chains: Sequence[Chain], frame: str, prefix: str) -> tuple[str, ...]:
     """Return a line on each chain that has no frame of this name."""
     without = [chain for chain in chains if chain.frame != frame]
-    return tuple(f'{chain.name} has no {frame} frame; its pose is that of '
-                 f'{prefix}{chain.frame_id}' for chain in without)
+    return tuple(
+        f'{chain.name} has no {frame} frame; its pose is that of '
+        f'{prefix}{chain.frame_id}'
+        for chain in without
+    )
 
 
 def _check_choice(parameter: str, value: str, choices: tuple[str, ...]) -> None:
     if value not in choices:
-        raise ParameterError(parameter, f'found {value!r}, allowed: {" or ".join(choices)}')
+        raise ParameterError(
+            parameter, f'found {value!r}, allowed: {" or ".join(choices)}'
+        )
 
 
 def _check_timeout(seconds: float) -> None:
     if not 0.0 <= seconds <= LONGEST_TIMEOUT:  # so written, NaN is refused, too
-        raise ParameterError('joint_timeout', f'found {seconds}, allowed: 0 to '
-                             f'{LONGEST_TIMEOUT:g} s; 0 turns it off')
+        raise ParameterError(
+            'joint_timeout',
+            f'found {seconds}, allowed: 0 to {LONGEST_TIMEOUT:g} s; 0 turns it off',
+        )
 
 
 def _check_joint_prefix(prefix: str) -> None:
     if not prefix.isprintable():
-        raise ParameterError('joint_prefix', f'found {prefix!r}, allowed: printable characters')
+        raise ParameterError(
+            'joint_prefix', f'found {prefix!r}, allowed: printable characters'
+        )
 
 
 def _check_frame_prefix(prefix: str) -> None:
     is_text = prefix.isprintable() and ' ' not in prefix
     if not is_text or prefix.startswith('/'):
-        raise ParameterError('frame_prefix', f'found {prefix!r}, allowed: printable characters '
-                             'other than space, and no leading slash, which tf2 cannot look up')
+        raise ParameterError(
+            'frame_prefix',
+            f'found {prefix!r}, allowed: printable characters '
+            'other than space, and no leading slash, which tf2 cannot look up',
+        )

@@ -76,8 +76,15 @@ class Description:
             return [self._fault_note()]
         notes = []
         if self._use and self._urdf:
-            notes.append(Note('description', '', INFO, 'computing with the description of '
-                              f'{self._urdf.name} on {self.topic}'))
+            notes.append(
+                Note(
+                    'description',
+                    '',
+                    INFO,
+                    'computing with the description of '
+                    f'{self._urdf.name} on {self.topic}',
+                )
+            )
         for chain, (text, is_far) in self._comparisons.items():
             if is_far:
                 way = f'{PARAMETER}:=true computes with the description on {self.topic}'
@@ -99,11 +106,25 @@ class Description:
         if self._fault:
             notes.append(self._fault_note())
         elif not self._urdf:
-            notes.append(Note('no_description', '', WARNING, 'no description of the robot has '
-                              f'come on {self.topic}; it has {count}'))
+            notes.append(
+                Note(
+                    'no_description',
+                    '',
+                    WARNING,
+                    'no description of the robot has '
+                    f'come on {self.topic}; it has {count}',
+                )
+            )
         if len(publishers) > 1:
-            notes.append(Note('descriptions', '', WARNING, f'{self.topic} has {count}, and the '
-                              f'last description counts: {", ".join(publishers)}'))
+            notes.append(
+                Note(
+                    'descriptions',
+                    '',
+                    WARNING,
+                    f'{self.topic} has {count}, and the '
+                    f'last description counts: {", ".join(publishers)}',
+                )
+            )
         return notes
 
     def value(self, chain: str) -> str:
@@ -123,26 +144,42 @@ class Description:
 
     def _fault_note(self) -> Note:
         if not self._use:
-            return Note(UNUSABLE, '', WARNING, f'not compared with the robot: {self._fault}')
+            return Note(
+                UNUSABLE, '', WARNING, f'not compared with the robot: {self._fault}'
+            )
         stays = 'nothing is published until another one comes'
         if self._urdf:
             stays = 'the one before stays'
-        return Note(UNUSABLE, '', ERROR, f'description of the robot not used: {self._fault}; '
-                    f'{stays}')
+        return Note(
+            UNUSABLE,
+            '',
+            ERROR,
+            f'description of the robot not used: {self._fault}; {stays}',
+        )
 
     def _notes_of_tf(self) -> list[Note]:
         """Warn of transforms that robot_state_publisher, which has the description, sends too."""
         configuration = self._configuration
         if not self._urdf or not configuration or not configuration.publish_tf:
             return []
-        ids = [configuration.frame_prefix + chain.frame_id for chain in configuration.chains]
+        ids = [
+            configuration.frame_prefix + chain.frame_id
+            for chain in configuration.chains
+        ]
         shared = [frame_id for frame_id in ids if frame_id in self._urdf.links]
         if not shared:
             return []
-        return [Note('shared_frames', '', WARNING, f'publish_tf sends {" and ".join(shared)}, '
-                     f'which the description on {self.topic} has, so that robot_state_publisher '
-                     'sends it, too: leave publish_tf off, or set a frame_prefix, which is not '
-                     'part of a description')]
+        return [
+            Note(
+                'shared_frames',
+                '',
+                WARNING,
+                f'publish_tf sends {" and ".join(shared)}, '
+                f'which the description on {self.topic} has, so that robot_state_publisher '
+                'sends it, too: leave publish_tf off, or set a frame_prefix, which is not '
+                'part of a description',
+            )
+        ]
 
 
 def compared(chain: Chain, urdf: Urdf, joint_prefix: str = '') -> Comparison:
@@ -156,8 +193,11 @@ def compared(chain: Chain, urdf: Urdf, joint_prefix: str = '') -> Comparison:
         joint_prefix: what is before the joint names of the chain, but not of the description.
     """
     root = chain.root_frame
-    frames = [frame for frame, tip_frame in chain.tip_frames.items()
-              if tip_frame.frame_id in urdf.links]
+    frames = [
+        frame
+        for frame, tip_frame in chain.tip_frames.items()
+        if tip_frame.frame_id in urdf.links
+    ]
     if root not in urdf.links:
         return _not_compared(f'no frame {root}', urdf)
     if not frames:
@@ -175,14 +215,18 @@ def _compared_at(chain: Chain, urdf: Urdf, joint_prefix: str) -> Comparison:
         return Comparison(f'not compared: {error}')
     moving = {joint.moved_by for joint in path if joint.moves}
     positions = postures(chain, _POSTURES)
-    bare = {joint.removeprefix(joint_prefix): values for joint, values in positions.items()}
+    bare = {
+        joint.removeprefix(joint_prefix): values for joint, values in positions.items()
+    }
     if moving != bare.keys():
         joints = ', '.join(sorted(moving)) or 'none'
         return _not_compared(f'the joints from {root} to {tip} are {joints}', urdf)
     off = distance(chain.forward(positions), urdf.forward(root, tip, bare))
     is_far = off.mm > _NEAR_MM or off.deg > _NEAR_DEG
     return Comparison(
-        f"{tip} is up to {off.mm:.2f} mm and {off.deg:.2f} deg off the robot's own", is_far)
+        f"{tip} is up to {off.mm:.2f} mm and {off.deg:.2f} deg off the robot's own",
+        is_far,
+    )
 
 
 def _not_compared(reason: str, urdf: Urdf) -> Comparison:

@@ -99,12 +99,19 @@ def _of_messages(look: Look, on_topic: str) -> Iterator[tuple[str, str]]:
     jumps = look.rejected[TIME_JUMP]
     where = look.faults.get(TIME_JUMP)
     if jumps >= _MANY_JUMPS and jumps * _LOOP > look.messages:
-        yield 'many_time_jumps', (
-            f'time stepped back {jumps} times in {look.messages} messages, last to {where}: '
-            'do several publishers bring the same joints?')
+        yield (
+            'many_time_jumps',
+            (
+                f'time stepped back {jumps} times in {look.messages} messages, last to {where}: '
+                'do several publishers bring the same joints?'
+            ),
+        )
     elif jumps:
         times = f' {jumps} times, last' if jumps > 1 else ''
-        yield TIME_JUMP, f'time stepped back{times} to {where}; held joints are forgotten'
+        yield (
+            TIME_JUMP,
+            f'time stepped back{times} to {where}; held joints are forgotten',
+        )
 
 
 def _of_chain(look: ChainLook) -> Iterator[tuple[str, str]]:
@@ -125,23 +132,34 @@ def _of_chain(look: ChainLook) -> Iterator[tuple[str, str]]:
 def _of_frame_ids(look: Look, chain_look: ChainLook) -> Iterator[tuple[str, str]]:
     """Yield a warning of a joint that comes under several frame ids."""
     for joint in chain_look.chain.joint_names:
-        frame_ids = [repr(name) for name, joints in look.frame_ids.items() if joint in joints]
+        frame_ids = [
+            repr(name) for name, joints in look.frame_ids.items() if joint in joints
+        ]
         if len(frame_ids) > 1:
-            yield 'frame_ids', (
-                f'{joint} comes under the frame ids {" and ".join(frame_ids)}: from '
-                f'{len(frame_ids)} robots?')
+            yield (
+                'frame_ids',
+                (
+                    f'{joint} comes under the frame ids {" and ".join(frame_ids)}: from '
+                    f'{len(frame_ids)} robots?'
+                ),
+            )
             return
 
 
-def _of_names(look: Look, chain_look: ChainLook, on_topic: str, joint_prefix: str
-              ) -> Iterator[tuple[str, str]]:
+def _of_names(
+    look: Look, chain_look: ChainLook, on_topic: str, joint_prefix: str
+) -> Iterator[tuple[str, str]]:
     """Yield a warning if no joint of a chain has come."""
     joints = chain_look.chain.joint_names
     if not look.names or not look.joints.isdisjoint(joints):
         return
-    yield 'no_match', (
-        f'no message{on_topic} has one of its joints ({", ".join(joints)}); names that came: '
-        f'{names_that_came(look)}{_hint(joints, look.names, joint_prefix)}')
+    yield (
+        'no_match',
+        (
+            f'no message{on_topic} has one of its joints ({", ".join(joints)}); names that came: '
+            f'{names_that_came(look)}{_hint(joints, look.names, joint_prefix)}'
+        ),
+    )
 
 
 def _hint(joints: Sequence[str], names: Iterable[str], joint_prefix: str) -> str:

@@ -37,7 +37,8 @@ def add_joint_positions(parser: argparse.ArgumentParser, *, required: bool) -> N
             metavar='Q',
             nargs='+',
             type=_joint_position,
-            help=f'joint positions in {unit}, root to tip; of a prismatic joint always in metres')
+            help=f'joint positions in {unit}, root to tip; of a prismatic joint always in metres',
+        )
 
 
 def number(text: str) -> float:
@@ -50,21 +51,27 @@ def number(text: str) -> float:
         return math.nan
 
 
-def number_between(low: float, high: float, allowed: str = '') -> Callable[[str], float]:
+def number_between(
+    low: float, high: float, allowed: str = ''
+) -> Callable[[str], float]:
     """Return what reads an option that is a number from one to another, both included."""
+
     def parse(text: str) -> float:
         value = number(text)
         if not low <= value <= high:
             numbers = allowed or f'{low:g} to {high:g}'
             raise argparse.ArgumentTypeError(f'found {text!r}, allowed: {numbers}')
         return value
+
     return parse
 
 
 def load_catalog(args: argparse.Namespace) -> Catalog:
     """Return the catalog that `-k` names, with a line on stderr for each of its warnings."""
     for option in ('kinematics_file', 'root', 'version', 'foot_frame'):
-        if getattr(args, option, None) == '':  # as an unset variable of the shell leaves it
+        if (
+            getattr(args, option, None) == ''
+        ):  # as an unset variable of the shell leaves it
             words = option.replace('_', '-')
             raise LegFKError(f'--{words} is empty; leave it out for its default')
     catalog = Catalog.load(args.kinematics_file, root=getattr(args, 'root', None))
@@ -76,7 +83,9 @@ def load_catalog(args: argparse.Namespace) -> Catalog:
 def refuse_no_chains(catalog: Catalog) -> None:
     """Refuse a URDF without chains."""
     if not catalog.chains:
-        raise InputFileError(catalog.file, 'has no chain: no joint moves a link at its ends')
+        raise InputFileError(
+            catalog.file, 'has no chain: no joint moves a link at its ends'
+        )
 
 
 def load_chain(args: argparse.Namespace) -> tuple[Catalog, Chain]:
@@ -96,8 +105,10 @@ def chains_of_one_root(args: argparse.Namespace) -> list[Chain]:
     chains = catalog.select(args.chains or legs or catalog.chains, args.version)
     roots = sorted({chain.root_frame for chain in chains})
     if len(roots) > 1:
-        raise LegFKError(f'the chains have the root frames {", ".join(roots)}; allowed: chains of '
-                         'one root frame')
+        raise LegFKError(
+            f'the chains have the root frames {", ".join(roots)}; allowed: chains of '
+            'one root frame'
+        )
     if not args.foot_frame:
         return list(chains)
     return [chain.with_frame(args.foot_frame) for chain in chains]
@@ -109,8 +120,11 @@ def joint_positions(args: argparse.Namespace, chain: Chain) -> list[float] | Non
     if not given:
         return None
     if len(given) != chain.n:
-        raise JointVectorError('the joint vector', f'has {len(given)} entries',
-                               f'{chain.n}, in the order {" ".join(chain.joint_names)}')
+        raise JointVectorError(
+            'the joint vector',
+            f'has {len(given)} entries',
+            f'{chain.n}, in the order {" ".join(chain.joint_names)}',
+        )
     if args.radians:
         _warn_of_degrees(chain, args.radians)
         return list(args.radians)
@@ -122,13 +136,16 @@ def joint_positions(args: argparse.Namespace, chain: Chain) -> list[float] | Non
 
 def _joint_position(text: str) -> float:
     if ',' in text:
-        raise argparse.ArgumentTypeError(f'found {text!r}; numbers are separated by spaces, and '
-                                         'their decimals by a point')
+        raise argparse.ArgumentTypeError(
+            f'found {text!r}; numbers are separated by spaces, and '
+            'their decimals by a point'
+        )
     return _position_in_bounds(text)
 
 
 _position_in_bounds = number_between(
-    -LARGEST, LARGEST, f'finite numbers up to {LARGEST:g}, one per joint')
+    -LARGEST, LARGEST, f'finite numbers up to {LARGEST:g}, one per joint'
+)
 
 
 def _warn_of_degrees(chain: Chain, q: list[float]) -> None:
@@ -140,11 +157,16 @@ def _warn_of_degrees(chain: Chain, q: list[float]) -> None:
         if name in outside and is_turns:
             doubtful.append(f'{name} {value:g}')
     if doubtful:
-        print(f'leg_fk: warning: positions look like degrees, for which there is --degrees: '
-              f'{", ".join(doubtful)}', file=sys.stderr)
+        print(
+            f'leg_fk: warning: positions look like degrees, for which there is --degrees: '
+            f'{", ".join(doubtful)}',
+            file=sys.stderr,
+        )
 
 
-def _complete_chain(prefix: str, parsed_args: argparse.Namespace, **_: Any) -> list[str]:
+def _complete_chain(
+    prefix: str, parsed_args: argparse.Namespace, **_: Any
+) -> list[str]:
     """Return the chains, or after an equals sign the versions of one."""
     catalog = load_catalog(parsed_args)
     name = prefix.rpartition('=')[0]
@@ -155,7 +177,9 @@ def _complete_chain(prefix: str, parsed_args: argparse.Namespace, **_: Any) -> l
 
 def _complete_version(parsed_args: argparse.Namespace, **_: Any) -> list[str]:
     """Return the versions of the chains typed so far, or of all."""
-    return [version for entry in _typed_chains(parsed_args) for version in entry.versions]
+    return [
+        version for entry in _typed_chains(parsed_args) for version in entry.versions
+    ]
 
 
 def _complete_frame(parsed_args: argparse.Namespace, **_: Any) -> list[str]:
@@ -186,39 +210,43 @@ _COMPLETERS: dict[str, Callable[..., list[str]]] = {
 _OPTIONS: dict[str, dict[str, Any]] = {
     'chain': {
         'metavar': 'CHAIN',
-        'help': 'a chain, such as left_leg or left_leg=v1 (leg_fk list shows them)'},
+        'help': 'a chain, such as left_leg or left_leg=v1 (leg_fk list shows them)',
+    },
     'chains': {
         'metavar': 'CHAIN',
         'nargs': '*',
         'help': 'chains, such as left_leg or head_imu=v2 (default: all that have the version '
-                'asked for, or if none is, that of the first chain)'},
+        'asked for, or if none is, that of the first chain)',
+    },
     '--chains': {
         'metavar': 'CHAIN',
         'nargs': '+',
-        'help': 'chains, such as left_leg or head_imu=v2 (default: both legs)'},
+        'help': 'chains, such as left_leg or head_imu=v2 (default: both legs)',
+    },
     '--version': {
         'metavar': 'VERSION',
-        'help': "of the chains named without one (default: the file's)"},
+        'help': "of the chains named without one (default: the file's)",
+    },
     '--foot-frame': {
         'metavar': 'FRAME',
         'help': "axes of the tip: of the iCub's feet dh, the table's last frame (the default), "
-                'or sole, x forward, y left, z up'},
+        'or sole, x forward, y left, z up',
+    },
     '--joint-topic': {
         'metavar': 'TOPIC',
         'help': "the bag's topic of joint states (default: /joint_states, or the only one there "
-                'is)'},
-    '--json': {
-        'action': 'store_true',
-        'help': 'print JSON, for programs'},
+        'is)',
+    },
+    '--json': {'action': 'store_true', 'help': 'print JSON, for programs'},
     '--kinematics-file': {
         'metavar': 'FILE',
         'help': 'a kinematics file, with the DH tables of any robot, or a URDF (default: the '
-                'tables of the iCub, as shipped)'},
+        'tables of the iCub, as shipped)',
+    },
     '--root': {
         'metavar': 'LINK',
         'help': 'of a URDF, the link that poses are given in (default: root_link, or the top of '
-                'the tree)'},
-    '--force': {
-        'action': 'store_true',
-        'help': 'replace what exists already'},
+        'the tree)',
+    },
+    '--force': {'action': 'store_true', 'help': 'replace what exists already'},
 }

@@ -16,8 +16,9 @@ _PART_OF_BAG = re.compile(r'.*\.(mcap|db3)(\.zstd)?(-wal|-shm)?')
 
 
 @contextmanager
-def whole_path(path: str | Path, *, force: bool,
-               may_replace: Callable[[Path], bool] = Path.is_file) -> Iterator[Path]:
+def whole_path(
+    path: str | Path, *, force: bool, may_replace: Callable[[Path], bool] = Path.is_file
+) -> Iterator[Path]:
     """Give a path to make a file or directory at; it takes its place when the block ends well.
 
     The work is done in a hidden directory next to the target, which is removed. A target
@@ -29,8 +30,12 @@ def whole_path(path: str | Path, *, force: bool,
     check_target(path, force=force, may_replace=may_replace)
     target = Path(os.path.realpath(path))
     try:
-        with tempfile.TemporaryDirectory(prefix=f'.{target.name}.', suffix='.part',
-                                         dir=target.parent, ignore_cleanup_errors=True) as work:
+        with tempfile.TemporaryDirectory(
+            prefix=f'.{target.name}.',
+            suffix='.part',
+            dir=target.parent,
+            ignore_cleanup_errors=True,
+        ) as work:
             new = Path(work, target.name)
             yield new
             check_target(path, force=force, may_replace=may_replace)
@@ -42,8 +47,9 @@ def whole_path(path: str | Path, *, force: bool,
         raise _cannot_be_written(path, error) from error
 
 
-def check_target(path: str | Path, *, force: bool,
-                 may_replace: Callable[[Path], bool] = Path.is_file) -> None:
+def check_target(
+    path: str | Path, *, force: bool, may_replace: Callable[[Path], bool] = Path.is_file
+) -> None:
     """Refuse a target that `whole_path` would refuse, before any work is done.
 
     Raises:
@@ -55,12 +61,17 @@ def check_target(path: str | Path, *, force: bool,
         raise OutputFileError(str(path), f'there is no directory {target.parent}')
     if os.path.lexists(target):
         if not may_replace(target):
-            raise OutputFileError(str(path), 'exists already and is something else than what '
-                                             'would be written; nothing replaces it')
+            raise OutputFileError(
+                str(path),
+                'exists already and is something else than what '
+                'would be written; nothing replaces it',
+            )
         if not force:
             raise OutputFileError(str(path), 'exists already; --force replaces it')
     try:
-        tempfile.TemporaryDirectory(prefix=f'.{target.name}.', dir=target.parent).cleanup()
+        tempfile.TemporaryDirectory(
+            prefix=f'.{target.name}.', dir=target.parent
+        ).cleanup()
     except OSError as error:
         raise _cannot_be_written(path, error) from error
 
@@ -80,11 +91,16 @@ def refuse_option_like(path: str | Path) -> None:
     if not name or not Path(path).name:
         raise OutputFileError(repr(str(path)), 'is not the name of a file')
     if name == STANDARD_OUTPUT:
-        raise OutputFileError(name, 'is standard output, which does not take this; allowed: the '
-                                    'name of a file')
+        raise OutputFileError(
+            name,
+            'is standard output, which does not take this; allowed: the name of a file',
+        )
     if name.startswith('-'):
-        raise OutputFileError(name, f'begins with a minus sign, as options do; a file of this '
-                                    f'name is written ./{name}')
+        raise OutputFileError(
+            name,
+            f'begins with a minus sign, as options do; a file of this '
+            f'name is written ./{name}',
+        )
 
 
 def write_text(path: str | None, text: str, *, force: bool) -> None:

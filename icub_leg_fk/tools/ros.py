@@ -33,5 +33,6 @@ def import_ros(purpose: str) -> Ros:
         from sensor_msgs.msg import JointState
     except ImportError as error:
         raise MissingDependencyError(
-            'rclpy', purpose, 'source ROS 2, or pip install "icub_leg_fk[ros]"') from error
+            'rclpy', purpose, 'source ROS 2, or pip install "icub_leg_fk[ros]"'
+        ) from error
     return Ros(rclpy, JointState, PoseStamped)

@@ -28,10 +28,14 @@ def rviz_config(configuration: Configuration, node: str) -> str:
     chains = configuration.chains
     points = _points(chains)
     size = float(np.ptp(points, axis=0).max())
-    manager['Displays'] = _displays(manager['Displays'], chains, node, round(_AXES * size, 3))
+    manager['Displays'] = _displays(
+        manager['Displays'], chains, node, round(_AXES * size, 3)
+    )
     floor = _named(manager['Displays'], 'Floor')
     floor['Offset']['Z'] = round(float(points[:, 2].min()), 3)
-    manager['Global Options']['Fixed Frame'] = configuration.frame_prefix + chains[0].root_frame
+    manager['Global Options']['Fixed Frame'] = (
+        configuration.frame_prefix + chains[0].root_frame
+    )
     view = manager['Views']['Current']
     view['Distance'] = round(_VIEW * size, 3)
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
@@ -45,8 +49,9 @@ def _points(chains: Sequence[Chain]) -> Array:
     return np.vstack([np.zeros((1, 3)), *origins])
 
 
-def _displays(shipped: Sequence[dict[str, Any]], chains: Sequence[Chain], node: str,
-              length: float) -> list[dict[str, Any]]:
+def _displays(
+    shipped: Sequence[dict[str, Any]], chains: Sequence[Chain], node: str, length: float
+) -> list[dict[str, Any]]:
     """Return the displays, with a pose for each chain, with axes of this length [m]."""
     pose = next(display for display in shipped if display['Class'] == _POSE)
     displays = [display for display in shipped if display['Class'] != _POSE]

@@ -59,7 +59,9 @@ class Viewer:
         source: what moves them; None for the sliders.
     """
 
-    def __init__(self, server: Any, chains: Sequence[Chain], source: Source | None) -> None:
+    def __init__(
+        self, server: Any, chains: Sequence[Chain], source: Source | None
+    ) -> None:
         self._chains = tuple(chains)
         self._source = source
         self._changed = Event()
@@ -69,15 +71,19 @@ class Viewer:
         gui.configure_theme(show_logo=False, show_share_button=False)
         if source:
             source.add_controls(gui, self._on_change)
-        self._sliders = JointSliders(gui, chains, self._on_change, follow=source is not None)
+        self._sliders = JointSliders(
+            gui, chains, self._on_change, follow=source is not None
+        )
         if not source:
             button = gui.add_button('back to the start', color='gray')
             button.on_click(lambda _: self._sliders.reset())
         self._add_panel(gui)
         gui.main_panel.dock_right()
         gui.main_panel.set_width(330)
-        points = [drawn.outer_points(PosedChain(chain, self._sliders.positions(chain)))
-                  for chain in chains]
+        points = [
+            drawn.outer_points(PosedChain(chain, self._sliders.positions(chain)))
+            for chain in chains
+        ]
         self._fixed = self._fixed_scene(np.vstack(points))
         self._place_camera(server, np.vstack(points))
 
@@ -162,7 +168,10 @@ class Viewer:
                 with gui.add_folder(f'{chain.tip}: {chain.frame_id}'):
                     self._tips.append(Numbers(gui))
         with panel.add_tab('Method'):
-            marks = ((0, 'off'), *((step, str(step)) for step in range(1, len(STEPS) + 1)))
+            marks = (
+                (0, 'off'),
+                *((step, str(step)) for step in range(1, len(STEPS) + 1)),
+            )
             self._step = gui.add_slider('step', 0, len(STEPS), 1, 0, marks=marks)
             self._chain = gui.add_dropdown('chain', self._names)
             self._row = gui.add_slider('row', 0, 1, 1, 0, visible=False)

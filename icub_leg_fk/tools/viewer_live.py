@@ -38,7 +38,9 @@ class LiveJoints:
         self._topic = topic
         self._input = JointInput(time.time_ns)
         self._input.configure(chains, DEFAULT_TIMEOUT)
-        self._newest: dict[str, tuple[Sequence[float], float]] = {}  # q, and when it came [s]
+        self._newest: dict[
+            str, tuple[Sequence[float], float]
+        ] = {}  # q, and when it came [s]
         self._notes: list[Note] = []
         self._looked = time.monotonic()
         self._lock = Lock()
@@ -70,8 +72,10 @@ class LiveJoints:
         """Return the joints of every chain as they came last."""
         with self._lock:
             newest = dict(self._newest)
-        return [self._posture(chain, *newest.get(chain.name, (None, 0.0)))
-                for chain in self._input.chains]
+        return [
+            self._posture(chain, *newest.get(chain.name, (None, 0.0)))
+            for chain in self._input.chains
+        ]
 
     def trails(self) -> list[Array]:
         """Return no places: only the trails of a recording are drawn."""
@@ -98,20 +102,34 @@ def live_joints(chains: Sequence[Chain], topic: str) -> Iterator[LiveJoints]:
     joints = LiveJoints(chains, topic)
     context = rclpy.context.Context()
     quality = rclpy.qos.QoSProfile(
-        depth=_DEPTH, reliability=rclpy.qos.QoSReliabilityPolicy.BEST_EFFORT)
+        depth=_DEPTH, reliability=rclpy.qos.QoSReliabilityPolicy.BEST_EFFORT
+    )
     try:
-        rclpy.init(args=[], context=context,
-                   signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
-        node = rclpy.create_node('leg_fk_view', context=context, use_global_arguments=False,
-                                 enable_rosout=False, start_parameter_services=False)
+        rclpy.init(
+            args=[],
+            context=context,
+            signal_handler_options=rclpy.signals.SignalHandlerOptions.NO,
+        )
+        node = rclpy.create_node(
+            'leg_fk_view',
+            context=context,
+            use_global_arguments=False,
+            enable_rosout=False,
+            start_parameter_services=False,
+        )
         node.create_subscription(joint_state, topic, joints.take, quality, raw=True)
     except rclpy.exceptions.InvalidTopicNameException as error:
         context.try_shutdown()
         reason = str(error).splitlines()[0].rstrip(':').partition(': ')[2]
         raise LegFKError(f'--joint-topic: found {topic!r}; {reason}') from error
-    except (RuntimeError, ValueError) as error:  # what rclpy raises for what rcl refuses
+    except (
+        RuntimeError,
+        ValueError,
+    ) as error:  # what rclpy raises for what rcl refuses
         context.try_shutdown()
-        raise LegFKError(f'ROS 2 cannot be started: {" ".join(str(error).split())}') from error
+        raise LegFKError(
+            f'ROS 2 cannot be started: {" ".join(str(error).split())}'
+        ) from error
     executor = rclpy.executors.SingleThreadedExecutor(context=context)
     executor.add_node(node)
 

@@ -34,12 +34,14 @@ from icub_leg_fk.tools.viewer_scene import (
 )
 import numpy as np
 
-STEPS = ('The z axis of each joint',
-         'The origin of each frame, and the common normals (mm)',
-         'The x axis of each frame',
-         'The y axis of each frame, by the right-hand rule',
-         'The table, one row at a time (mm)',
-         'Multiply (mm)')
+STEPS = (
+    'The z axis of each joint',
+    'The origin of each frame, and the common normals (mm)',
+    'The x axis of each frame',
+    'The y axis of each frame, by the right-hand rule',
+    'The table, one row at a time (mm)',
+    'Multiply (mm)',
+)
 
 _X_COLOR, _Y_COLOR, _Z_COLOR = AXIS_COLORS
 _ARC_STEP = math.radians(4)
@@ -135,11 +137,15 @@ class Method:
             x, z = after[:3, 0], before[:3, 2]
             foot = first + d * z
             d_ends, a_ends = (first, foot), (foot, last)
-        return RowGeometry(theta, d, link.a, link.alpha, x, z, np.array(d_ends), np.array(a_ends))
+        return RowGeometry(
+            theta, d, link.a, link.alpha, x, z, np.array(d_ends), np.array(a_ends)
+        )
 
     def _moved(self, row: int) -> float:
         """Return how far the joint of a row has moved it [rad or m]."""
-        return self.rows[row].link.gain * float(self._posed.q[self.rows[row].joint_index])
+        return self.rows[row].link.gain * float(
+            self._posed.q[self.rows[row].joint_index]
+        )
 
     def _axis_scene(self, letter: str, column: int, length: float) -> Scene:
         """Return one axis of every frame with its name; a z axis goes on beyond its origin."""
@@ -148,7 +154,9 @@ class Method:
         names = [f'{letter}_{i}' for i in range(len(self.frames))]
         scene = labels(f'method/{letter}', names, origins + 1.1 * along, self._size)
         ends = np.stack((origins, origins + along), axis=1)
-        scene[f'method/{letter} axes'] = arrows(ends, AXIS_COLORS[column], 3.0, self._size)
+        scene[f'method/{letter} axes'] = arrows(
+            ends, AXIS_COLORS[column], 3.0, self._size
+        )
         if letter == 'z':
             lines = np.stack((origins - along, origins), axis=1)
             scene['method/z lines'] = segments(lines, _Z_COLOR, 1.0)
@@ -181,21 +189,28 @@ class Method:
         length = 0.2 * self._size
         tips = pair[:, :3, 3, None] + 1.08 * length * pair[:, :3, :3]
         names = [f'{axis}_{i}' for i in (row, row + 1) for axis in 'xyz']
-        scene = labels('method/axis', names, tips.swapaxes(1, 2).reshape(-1, 3), self._size)
+        scene = labels(
+            'method/axis', names, tips.swapaxes(1, 2).reshape(-1, 3), self._size
+        )
         scene['method/two frames'] = axes(pair, length, 2.5)
         others = [other for other in range(len(self.rows)) if other != row]
         scene |= self._path_scene(others, FAINT)
         scene |= _length_scene(f'd_{row}', geometry.d, geometry.d_ends, _Z_COLOR)
         scene |= _length_scene(f'a_{row}', geometry.a, geometry.a_ends, _X_COLOR)
         # Both angles are drawn in the frame's origin from which, or to which, their axis leads.
-        first_x, first_z = 0.1 * self._size * pair[0, :3, 0], 0.1 * self._size * pair[0, :3, 2]
+        first_x, first_z = (
+            0.1 * self._size * pair[0, :3, 0],
+            0.1 * self._size * pair[0, :3, 2],
+        )
         x_origin, z_origin = pair[1, :3, 3], pair[0, :3, 3]
         if self._is_modified:
             x_origin, z_origin = z_origin, x_origin
         theta = arc(z_origin, geometry.z, first_x, geometry.theta)
         alpha = arc(x_origin, geometry.x, first_z, geometry.alpha)
         scene |= _angle_scene(f'theta_{row}', geometry.theta, z_origin, theta, _Z_COLOR)
-        return scene | _angle_scene(f'alpha_{row}', geometry.alpha, x_origin, alpha, _X_COLOR)
+        return scene | _angle_scene(
+            f'alpha_{row}', geometry.alpha, x_origin, alpha, _X_COLOR
+        )
 
     def _product_scene(self) -> Scene:
         """Return the way from frame to frame, and the tip's frame to which it leads."""
@@ -221,7 +236,9 @@ class Method:
         scale = 1000.0 if column == 3 else 1.0
         cells = [_numbers(scale * T[:3, column]) for T in self.frames]
         rows = []
-        for i, (vector, remark) in enumerate(zip(text.matrix(cells, '  '), remarks, strict=True)):
+        for i, (vector, remark) in enumerate(
+            zip(text.matrix(cells, '  '), remarks, strict=True)
+        ):
             rows.append([f'{letter}_{i}', f'({vector[1:-1]})', remark])
         return text.columns(rows)
 
@@ -258,18 +275,35 @@ class Method:
         geometry, following = self.geometry(row), row + 1
         z, x = (following, row) if self._is_modified else (row, following)
         theta, d = self._sums(row, geometry)
-        values = text.columns([
-            [f'theta_{row}', f'= {theta} deg', f'about z_{z}, x_{row} to x_{following}'],
-            [f'd_{row}', f'= {d}', f'along z_{z}'],
-            [f'a_{row}', f'= {short(1000 * geometry.a)}', f'along x_{x}'],
-            [f'alpha_{row}', f'= {_in_pi(geometry.alpha)}',
-             f'about x_{x}, z_{row} to z_{following}']])
+        values = text.columns(
+            [
+                [
+                    f'theta_{row}',
+                    f'= {theta} deg',
+                    f'about z_{z}, x_{row} to x_{following}',
+                ],
+                [f'd_{row}', f'= {d}', f'along z_{z}'],
+                [f'a_{row}', f'= {short(1000 * geometry.a)}', f'along x_{x}'],
+                [
+                    f'alpha_{row}',
+                    f'= {_in_pi(geometry.alpha)}',
+                    f'about x_{x}, z_{row} to z_{following}',
+                ],
+            ]
+        )
         factors = [f'Rz(theta_{row}) tz(d_{row})', f'tx(a_{row}) Rx(alpha_{row})']
         if self._is_modified:
             factors = [f'Rx(alpha_{row}) tx(a_{row})', f'Rz(theta_{row}) tz(d_{row})']
         A = np.linalg.inv(self.frames[row]) @ self.frames[following]
         title = f'row i = {row}, {self.rows[row].joint or "fixed"}'
-        return [title, '', *values, '', f'A_{row} = {" ".join(factors)} =', *matrix_in_mm(A)]
+        return [
+            title,
+            '',
+            *values,
+            '',
+            f'A_{row} = {" ".join(factors)} =',
+            *matrix_in_mm(A),
+        ]
 
     def _sums(self, row: int, geometry: RowGeometry) -> tuple[str, str]:
         """Return theta [deg] and d [mm] of a row, as `90 - 30 = 60` if a joint adds to it."""
@@ -285,8 +319,14 @@ class Method:
         m = len(self.rows)
         factors = ' '.join(f'A_{i}' for i in range(m))
         T_0_m = np.linalg.inv(self.frames[0]) @ self.frames[-1]
-        lines = ['T_Ro0 =', *matrix_in_mm(self.frames[0]), '',
-                 f'T_0{m} = {factors} =', *matrix_in_mm(T_0_m), '']
+        lines = [
+            'T_Ro0 =',
+            *matrix_in_mm(self.frames[0]),
+            '',
+            f'T_0{m} = {factors} =',
+            *matrix_in_mm(T_0_m),
+            '',
+        ]
         product = f'T_Ro0 T_0{m}'
         if self._has_tip_transform():
             T_n_tip = np.linalg.inv(self.frames[-1]) @ self.tip
@@ -319,20 +359,26 @@ def _length_scene(name: str, length: float, ends: Array, color: str) -> Scene:
     if abs(length) < _NOTHING:
         return {}
     words = f'{name} = {short(1000 * length)}'
-    return {f'method/{name}': polyline(ends, color, 7.0),
-            f'method/{name} value': Label(words, ends.mean(axis=0))}
+    return {
+        f'method/{name}': polyline(ends, color, 7.0),
+        f'method/{name} value': Label(words, ends.mean(axis=0)),
+    }
 
 
-def _angle_scene(name: str, angle: float, center: Array, points: Array, color: str) -> Scene:
+def _angle_scene(
+    name: str, angle: float, center: Array, points: Array, color: str
+) -> Scene:
     """Return an angle [rad] as an arc with its name and value; nothing if it is 0."""
     if abs(angle) < _NOTHING:
         return {}
     sides = np.stack((points[0], center, points[-1]))
     label_place = center + 1.25 * (points[len(points) // 2] - center)
     words = f'{name} = {short(math.degrees(angle))} deg'
-    return {f'method/{name}': polyline(points, color, 5.0),
-            f'method/{name} sides': polyline(sides, color, 1.5),
-            f'method/{name} value': Label(words, label_place)}
+    return {
+        f'method/{name}': polyline(points, color, 5.0),
+        f'method/{name} sides': polyline(sides, color, 1.5),
+        f'method/{name} value': Label(words, label_place),
+    }
 
 
 def _sum(constant: float, total: float) -> str:
@@ -347,5 +393,7 @@ def _in_pi(angle: float) -> str:
     part = Fraction(f'{math.degrees(angle):.12g}') / 180
     if part.denominator > 180:
         return f'{angle:.6g}'
-    words = re.sub(r'\b1pi', 'pi', f'{part.numerator}pi/{part.denominator}').removesuffix('/1')
+    words = re.sub(
+        r'\b1pi', 'pi', f'{part.numerator}pi/{part.denominator}'
+    ).removesuffix('/1')
     return words if part else '0'

@@ -20,9 +20,15 @@ from icub_leg_fk.tools.viewer_scene import Dots, Label, Lines, PosedChain, Scene
 import numpy as np
 
 _BEYOND = 0.2  # of a range; so far beyond it a slider goes
-_BOUNDS = {'revolute': (-180.0, 180.0), 'prismatic': (-1.0, 1.0)}  # deg or m, without a range
+_BOUNDS = {
+    'revolute': (-180.0, 180.0),
+    'prismatic': (-1.0, 1.0),
+}  # deg or m, without a range
 _STEP = {'revolute': 0.1, 'prismatic': 0.001}  # deg or m
-_ROUND = {'revolute': 1.0, 'prismatic': 0.01}  # deg or m; a slider's ends are multiples of it
+_ROUND = {
+    'revolute': 1.0,
+    'prismatic': 0.01,
+}  # deg or m; a slider's ends are multiples of it
 _ROUNDING = 1e-9  # rad or m; from degrees and back
 
 _GREY, _RED = '#777777', '#d00000'
@@ -55,7 +61,9 @@ def running_server(host: str, port: int) -> Iterator[Any]:
     viser = _import_viser()
     _check_host(host)
     with redirect_stdout(io.StringIO()):  # viser's banner
-        server = viser.ViserServer(host=host, port=port, label='leg_fk view', verbose=False)
+        server = viser.ViserServer(
+            host=host, port=port, label='leg_fk view', verbose=False
+        )
     # Any page that reaches the server could ask viser to hand it on to the internet.
     server.request_share_url = lambda: None
     try:
@@ -69,19 +77,24 @@ def _import_viser() -> Any:
     try:
         return import_module('viser')
     except ImportError as error:
-        raise MissingDependencyError('viser', 'the viewer', 'pip install viser') from error
+        raise MissingDependencyError(
+            'viser', 'the viewer', 'pip install viser'
+        ) from error
 
 
 def _check_host(host: str) -> None:
     """Refuse an address that is not this machine's; viser would wait for ever."""
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(
-            host, 0, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
+            host, 0, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
         with socket.socket(family, kind, protocol) as trial:
             trial.bind(address)
     except (OSError, UnicodeError) as error:
-        raise LegFKError(f'--host: found {host!r}, allowed: an address of this machine, such as '
-                         '127.0.0.1, or 0.0.0.0 for all of them') from error
+        raise LegFKError(
+            f'--host: found {host!r}, allowed: an address of this machine, such as '
+            '127.0.0.1, or 0.0.0.0 for all of them'
+        ) from error
 
 
 class Canvas:
@@ -120,16 +133,32 @@ class Canvas:
     def _added(self, name: str, part: Lines | Dots | Label) -> Any:
         scene = self._server.scene
         if isinstance(part, Label):
-            return scene.add_label(name, part.text, position=part.at, font_screen_scale=0.8,
-                                   anchor='bottom-left')
+            return scene.add_label(
+                name,
+                part.text,
+                position=part.at,
+                font_screen_scale=0.8,
+                anchor='bottom-left',
+            )
         if isinstance(part, Lines):
             colors = np.array([_linear(color) for color in part.colors])
             both_ends = np.stack((colors, colors), axis=1)
-            return scene.add_line_segments(name, part.points, both_ends, thickness=part.width,
-                                           thickness_units='screen')
-        return scene.add_point_cloud(name, part.points, _rgb(part.color), point_size=part.size,
-                                     point_shape='circle', point_shading='flat',
-                                     precision='float32')
+            return scene.add_line_segments(
+                name,
+                part.points,
+                both_ends,
+                thickness=part.width,
+                thickness_units='screen',
+            )
+        return scene.add_point_cloud(
+            name,
+            part.points,
+            _rgb(part.color),
+            point_size=part.size,
+            point_shape='circle',
+            point_shading='flat',
+            precision='float32',
+        )
 
 
 def _look(part: Lines | Dots) -> tuple[Any, float]:
@@ -148,7 +177,9 @@ def _rgb(color: str) -> tuple[int, int, int]:
 def _linear(color: str) -> Array:
     """Return `#rrggbb` in linear light up to 1, which viser takes for lines (IEC 61966-2-1)."""
     values = np.array(_rgb(color)) / 255
-    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+    return np.where(
+        values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4
+    )
 
 
 class JointSliders:
@@ -161,8 +192,9 @@ class JointSliders:
         follow: whether the sliders only show what something else moves.
     """
 
-    def __init__(self, gui: Any, chains: Sequence[Chain], changed: Changed,
-                 follow: bool) -> None:
+    def __init__(
+        self, gui: Any, chains: Sequence[Chain], changed: Changed, follow: bool
+    ) -> None:
         self._gui = gui
         self._follow = follow
         self._links: dict[str, DHLink] = {}
@@ -180,8 +212,14 @@ class JointSliders:
         unit = 'm' if link.is_prismatic else 'degrees'
         self._links[name] = link
         self._sliders[name] = self._gui.add_slider(
-            name, low, high, _STEP[link.joint_type], slider_start(link), disabled=self._follow,
-            hint=f'{name} in {unit}')
+            name,
+            low,
+            high,
+            _STEP[link.joint_type],
+            slider_start(link),
+            disabled=self._follow,
+            hint=f'{name} in {unit}',
+        )
         self._lines[name] = self._gui.add_html('')
 
     def positions(self, chain: Chain) -> list[float]:
@@ -244,7 +282,10 @@ def _range_line(link: DHLink, position: float) -> str:
     if lower - _ROUNDING <= position <= upper + _ROUNDING:
         words, color = f'range {allowed}' if allowed else 'no range', _GREY
     else:
-        words, color = f'{chain_text.position(link, position)} is outside {allowed}', _RED
+        words, color = (
+            f'{chain_text.position(link, position)} is outside {allowed}',
+            _RED,
+        )
     return f'<div style="{_SMALL};margin-top:-6px;color:{color}">{html.escape(words)}</div>'
 
 
@@ -260,7 +301,9 @@ class Numbers:
         for title, lines in texts.items():
             parts.append(_div(title, _GREY))
             copied = html.escape('\n'.join(lines))
-            parts.append(f'<pre style="{_COPIED}" title="a click selects it">{copied}</pre>')
+            parts.append(
+                f'<pre style="{_COPIED}" title="a click selects it">{copied}</pre>'
+            )
         if note:
             parts.append(_div(note, _RED))
         self._html.content = ''.join(parts)
@@ -275,10 +318,14 @@ def tip_texts(posed: PosedChain) -> dict[str, list[str]]:
     T = posed.frames[-1]
     angles = np.degrees(roll_pitch_yaw(T[:3, :3]))
     matrix = [*map(_numbers, T[:3]), ['0', '0', '0', '1']]
-    return {'position (m)': [_named('xyz', _numbers(T[:3, 3]))],
-            'quaternion': [_named('xyzw', _numbers(posed.chain.pose(posed.q)[3:]))],
-            'roll, pitch, yaw (deg)': [_named(('roll', 'pitch', 'yaw'), _numbers(angles, 4))],
-            'matrix (translation in m)': text.matrix(matrix, '  ')}
+    return {
+        'position (m)': [_named('xyz', _numbers(T[:3, 3]))],
+        'quaternion': [_named('xyzw', _numbers(posed.chain.pose(posed.q)[3:]))],
+        'roll, pitch, yaw (deg)': [
+            _named(('roll', 'pitch', 'yaw'), _numbers(angles, 4))
+        ],
+        'matrix (translation in m)': text.matrix(matrix, '  '),
+    }
 
 
 def _numbers(values: Iterable[float], decimals: int = 7) -> list[str]:
@@ -286,4 +333,6 @@ def _numbers(values: Iterable[float], decimals: int = 7) -> list[str]:
 
 
 def _named(names: Sequence[str], values: Sequence[str]) -> str:
-    return '  '.join(f'{name} {value:>10}' for name, value in zip(names, values, strict=True))
+    return '  '.join(
+        f'{name} {value:>10}' for name, value in zip(names, values, strict=True)
+    )

@@ -46,7 +46,9 @@ class RecordedChain:
         end = self._count(at)
         chosen = np.arange(self._count(at - TRAIL), end)
         if len(chosen) > _TRAIL_POINTS:
-            chosen = np.linspace(chosen[0], chosen[-1], _TRAIL_POINTS).round().astype(int)
+            chosen = (
+                np.linspace(chosen[0], chosen[-1], _TRAIL_POINTS).round().astype(int)
+            )
         return self._chain.poses(self._positions[chosen])[:, :3]
 
     def _count(self, at: float) -> int:
@@ -72,12 +74,15 @@ class Recording:
 
     def add_controls(self, gui: Any, changed: Changed) -> None:
         """Add the time line, pause and speed to the page."""
+
         def press(event: Any) -> None:
             self._is_pressed = True
             changed(event)
 
         with gui.add_folder('recording'):
-            self._line = gui.add_slider('time [s]', self._start, self._end, 0.01, self._start)
+            self._line = gui.add_slider(
+                'time [s]', self._start, self._end, 0.01, self._start
+            )
             self._speed = gui.add_dropdown('speed', _SPEEDS, initial_value='1')
             self._button = gui.add_button('play')
         self._shown = self._line.value

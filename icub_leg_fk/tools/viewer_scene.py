@@ -17,8 +17,14 @@ FAINT = '#9a9a9a'
 GRID = '#d4d4d4'
 DOT = 0.01  # of the size of the scene
 
-_DIRECTIONS = {'forward': (1, 0, 0), 'backward': (-1, 0, 0), 'left': (0, 1, 0),
-               'right': (0, -1, 0), 'up': (0, 0, 1), 'down': (0, 0, -1)}
+_DIRECTIONS = {
+    'forward': (1, 0, 0),
+    'backward': (-1, 0, 0),
+    'left': (0, 1, 0),
+    'right': (0, -1, 0),
+    'up': (0, 0, 1),
+    'down': (0, 0, -1),
+}
 _UNKNOWN_ROOT = ('forward', 'left', 'up')  # REP-103
 _SAME_PLACE = 1e-6  # of the size of the scene; nearer labels become one
 _GRID_CELLS = 8  # in each direction
@@ -133,7 +139,9 @@ def axes(frames: Array, length: float, width: float) -> Lines:
     return Lines(ends, AXIS_COLORS * len(frames), width)
 
 
-def labels(prefix: str, names: Iterable[str], places: Iterable[Array], size: float) -> Scene:
+def labels(
+    prefix: str, names: Iterable[str], places: Iterable[Array], size: float
+) -> Scene:
     """Return a label per name; names at one place share a label."""
     merged: list[tuple[str, Array]] = []
     for name, place in zip(names, places, strict=True):
@@ -151,7 +159,9 @@ def reach(chains: Iterable[Chain]) -> float:
     longest = 0.0
     for chain in chains:
         lengths = [math.hypot(link.a, link.d) for link in chain.links]
-        lengths += [float(np.linalg.norm(T[:3, 3])) for T in (chain.T_root_0, chain.T_n_tip)]
+        lengths += [
+            float(np.linalg.norm(T[:3, 3])) for T in (chain.T_root_0, chain.T_n_tip)
+        ]
         longest = max(longest, sum(lengths))
     return longest or 1.0
 
@@ -180,9 +190,13 @@ def root_scene(chain: Chain, size: float) -> Scene:
     """Return the root's axes with their names."""
     length = 0.15 * size
     aside = np.full(3, -0.02 * size)  # frame 0 may be in the same place
-    scene: Scene = {'root/axes': axes(np.eye(4)[None], length, 4.0),
-                    'root/name': Label(chain.root_frame, aside)}
-    return scene | labels('root/axis', axis_names(chain), 1.1 * length * np.eye(3), size)
+    scene: Scene = {
+        'root/axes': axes(np.eye(4)[None], length, 4.0),
+        'root/name': Label(chain.root_frame, aside),
+    }
+    return scene | labels(
+        'root/axis', axis_names(chain), 1.1 * length * np.eye(3), size
+    )
 
 
 def floor_scene(points: Array, root_axes: Sequence[str], size: float) -> Scene:
@@ -204,14 +218,18 @@ def floor_scene(points: Array, root_axes: Sequence[str], size: float) -> Scene:
 def _round_step(length: float) -> float:
     """Return the largest of ..., 0.1, 0.2, 0.5, 1, 2, 5, ... that is no longer than a length."""
     decade = 10.0 ** math.floor(math.log10(length))
-    return max(decade * step for step in (1, 2, 5) if decade * step <= length * (1 + 1e-9))
+    return max(
+        decade * step for step in (1, 2, 5) if decade * step <= length * (1 + 1e-9)
+    )
 
 
 def skeleton_scene(posed: PosedChain, size: float) -> Scene:
     """Return a chain as lines through the origins of its frames, with its joints."""
     bones = polyline(posed.origins, color_of(posed.chain), 6.0)
-    return {f'{posed.tree_name}/bones': bones,
-            f'{posed.tree_name}/joints': Dots(posed.origins[:-1], INK, DOT * size)}
+    return {
+        f'{posed.tree_name}/bones': bones,
+        f'{posed.tree_name}/joints': Dots(posed.origins[:-1], INK, DOT * size),
+    }
 
 
 def faint_scene(posed: PosedChain) -> Scene:
@@ -234,8 +252,10 @@ def frames_scene(posed: PosedChain, size: float) -> Scene:
     """Return the frames of a chain's table, and the tip's, with their names."""
     frames = posed.frames
     names = [*map(str, range(len(frames) - 1)), posed.chain.frame_id]
-    scene: Scene = {f'{posed.tree_name}/frames': axes(frames[:-1], 0.06 * size, 2.0),
-                    f'{posed.tree_name}/tip': axes(frames[-1:], 0.12 * size, 4.0)}
+    scene: Scene = {
+        f'{posed.tree_name}/frames': axes(frames[:-1], 0.06 * size, 2.0),
+        f'{posed.tree_name}/tip': axes(frames[-1:], 0.12 * size, 4.0),
+    }
     return scene | labels(f'{posed.tree_name}/frame', names, posed.origins, size)
 
 

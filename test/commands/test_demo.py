@@ -34,7 +34,9 @@ JOINTS = [name for chain in Catalog.load().select(LEGS) for name in chain.joint_
 @pytest.fixture(autouse=True)
 def own_directory(tmp_path, monkeypatch):
     path = [str(Path(__file__).parents[2]), os.environ.get('PYTHONPATH', '')]
-    monkeypatch.setenv('PYTHONPATH', os.pathsep.join(filter(None, path)))  # for the processes
+    monkeypatch.setenv(
+        'PYTHONPATH', os.pathsep.join(filter(None, path))
+    )  # for the processes
     monkeypatch.chdir(tmp_path)
 
 
@@ -43,8 +45,9 @@ def walk(seconds):
 
 
 def start(*words):
-    return subprocess.Popen([*DEMO, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                            text=True)
+    return subprocess.Popen(
+        [*DEMO, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
 
 
 def children(pid):
@@ -58,7 +61,9 @@ def children(pid):
 
 def runs(pid):
     try:
-        return Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0] != 'Z'
+        return (
+            Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0] != 'Z'
+        )
     except OSError:
         return False
 
@@ -89,18 +94,23 @@ def write_csv(path, times, positions):
 def test_every_pose_of_the_gait_arrives_and_is_drawn_and_kept():
     done = run_main('demo', '--seconds', '1.5', '--save', 'walk')
     assert (done.returncode, done.stderr) == (0, '')
-    for said in (r'^iCub legs v2_5: 151 JointState messages',
-                 r'messages in +151\b',
-                 r'poses out +302 +\(left_foot 151, right_foot 151\)',
-                 r'lost +none',
-                 r'latency +median [\d.]+ ms +p99 [\d.]+ ms +max [\d.]+ ms'):
+    for said in (
+        r'^iCub legs v2_5: 151 JointState messages',
+        r'messages in +151\b',
+        r'poses out +302 +\(left_foot 151, right_foot 151\)',
+        r'lost +none',
+        r'latency +median [\d.]+ ms +p99 [\d.]+ ms +max [\d.]+ ms',
+    ):
         assert re.search(said, done.stdout)
     assert Path('demo.png').read_bytes().startswith(b'\x89PNG')
     assert sorted(path.name for path in Path().iterdir()) == ['demo.png', 'walk']
     # Without a terminal there is a plain line a second, and one of the last state.
     assert '\x1b' not in done.stdout
-    lines = re.findall(r'^ +([\d.]+) s   in root_link: left foot: .*   right foot: x \S+',
-                       done.stdout, re.MULTILINE)
+    lines = re.findall(
+        r'^ +([\d.]+) s   in root_link: left foot: .*   right foot: x \S+',
+        done.stdout,
+        re.MULTILINE,
+    )
     assert lines[-1] == '1.50' and 2 <= len(lines) <= 3
     # What was sent can be converted and drawn.
     assert run_main('bag', 'walk', 'poses').returncode == 0
@@ -119,7 +129,9 @@ def test_talks_inside_the_machine_in_a_domain_of_its_own(monkeypatch):
 
 
 def test_recording_is_played_in_its_own_timing():
-    times = np.cumsum(np.r_[5.0, np.tile([0.002, 0.04, 0.0], 17)[:49]])  # 0.7 s, from 5 s on
+    times = np.cumsum(
+        np.r_[5.0, np.tile([0.002, 0.04, 0.0], 17)[:49]]
+    )  # 0.7 s, from 5 s on
     write_csv(Path('walk.csv'), times, walk(0.49).positions)
     done = run_main('demo', '--recording', 'walk.csv', '-o', 'walk.svg')
     assert done.returncode == 0, done.stderr
@@ -136,8 +148,10 @@ def test_poses_received_are_those_of_the_chains(version, foot_frame):
     parameters = {'version': version, 'foot_frame': foot_frame}
     parameters |= replays.lossless(namespace, TIPS, 1000)
     gait = walk(0.5)
-    with closing(replays.Replay(gait, namespace, TIPS)) as replay, \
-            replays.running_node(namespace, parameters) as (_, check):
+    with (
+        closing(replays.Replay(gait, namespace, TIPS)) as replay,
+        replays.running_node(namespace, parameters) as (_, check),
+    ):
         replay.wait_for_node(check)
         replay.play(lambda elapsed: None, 0.1, check)
     chains = Catalog.load().select(LEGS, version)
@@ -148,11 +162,17 @@ def test_poses_received_are_those_of_the_chains(version, foot_frame):
         assert (answers.latencies > 0).all()
 
 
-@pytest.mark.parametrize(('missing', 'counts'), [
-    (slice(3, 5), r'18 +\(left_foot 10, right_foot 8\)\nlost +2\n'),
-    (slice(None), r'10 +\(left_foot 10, right_foot 0\)\nlost +10\n')])
+@pytest.mark.parametrize(
+    ('missing', 'counts'),
+    [
+        (slice(3, 5), r'18 +\(left_foot 10, right_foot 8\)\nlost +2\n'),
+        (slice(None), r'10 +\(left_foot 10, right_foot 0\)\nlost +10\n'),
+    ],
+)
 def test_lost_poses_are_reported_and_exit_1(capsys, missing, counts):
-    answers = [replays.Answers(tip, np.zeros((10, 7)), np.full(10, 1e-3)) for tip in TIPS]
+    answers = [
+        replays.Answers(tip, np.zeros((10, 7)), np.full(10, 1e-3)) for tip in TIPS
+    ]
     answers[1].latencies[missing] = np.nan
     assert conclude(answers, list(range(10)), True) == 1
     captured = capsys.readouterr()
@@ -162,14 +182,16 @@ def test_lost_poses_are_reported_and_exit_1(capsys, missing, counts):
 
 
 def test_node_that_refuses_its_parameters_is_one_line():
-    with pytest.raises(replays.DemoError, match=r'exit status 1: .*v9.*v2_5'), \
-            replays.running_node('/leg_fk_test', {'version': 'v9'}) as (_, check):
+    with (
+        pytest.raises(replays.DemoError, match=r'exit status 1: .*v9.*v2_5'),
+        replays.running_node('/leg_fk_test', {'version': 'v9'}) as (_, check),
+    ):
         wait_until(check)
 
 
 def test_node_that_dies_is_one_line_and_exit_1():
     process = start('--seconds', '60')
-    node, = wait_until(lambda: children(process.pid))
+    (node,) = wait_until(lambda: children(process.pid))
     read_until(process.stdout, 'right foot: x')
     os.kill(node, signal.SIGKILL)
     _, err = process.communicate(timeout=90)
@@ -178,10 +200,12 @@ def test_node_that_dies_is_one_line_and_exit_1():
     assert 'the node stopped with exit status -9' in err
 
 
-@pytest.mark.parametrize(('number', 'early'), [(signal.SIGINT, False), (signal.SIGTERM, True)])
+@pytest.mark.parametrize(
+    ('number', 'early'), [(signal.SIGINT, False), (signal.SIGTERM, True)]
+)
 def test_signals_leave_no_process_and_no_file_behind(number, early):
     process = start('--seconds', '60', '--save', 'walk')
-    node, = wait_until(lambda: children(process.pid))
+    (node,) = wait_until(lambda: children(process.pid))
     if not early:
         read_until(process.stdout, 'right foot: x')
     process.send_signal(number)
@@ -196,9 +220,19 @@ def test_signals_leave_no_process_and_no_file_behind(number, early):
 def test_on_a_terminal_the_table_is_redrawn_in_place():
     pytest.importorskip('rich')
     controller, terminal = pty.openpty()
-    environment = {**os.environ, 'TERM': 'xterm-256color', 'COLUMNS': '90', 'LINES': '30'}
-    process = subprocess.Popen([*DEMO, '--seconds', '1.5'], stdin=terminal, stdout=terminal,
-                               stderr=terminal, env=environment)
+    environment = {
+        **os.environ,
+        'TERM': 'xterm-256color',
+        'COLUMNS': '90',
+        'LINES': '30',
+    }
+    process = subprocess.Popen(
+        [*DEMO, '--seconds', '1.5'],
+        stdin=terminal,
+        stdout=terminal,
+        stderr=terminal,
+        env=environment,
+    )
     os.close(terminal)
     written = b''
     while select.select([controller], [], [], 60)[0]:
@@ -215,18 +249,21 @@ def test_on_a_terminal_the_table_is_redrawn_in_place():
     assert 'poses out' in summary and 'poses in' not in summary
 
 
-@pytest.mark.parametrize(('typed', 'named'), [
-    ('--version v9', ['v9', 'v2_5']),
-    ('--foot-frame toe', ['toe', 'sole']),
-    ('--seconds 0', ['--seconds', '0.1']),
-    ('-o demo.gif', ['.gif', '.png']),
-    ('-o none/demo.png', ['none']),
-    ('-o bad.csv.png --save none/walk', ['none']),
-    ('--save bad.csv', ['bad.csv', 'exists']),
-    ('--save kept.mcap', ['kept.mcap', '--force']),
-    ('--recording no.csv', ['no.csv']),
-    ('--recording bad.csv', ['bad.csv:3', 'column r_knee', "'nan'"]),
-])
+@pytest.mark.parametrize(
+    ('typed', 'named'),
+    [
+        ('--version v9', ['v9', 'v2_5']),
+        ('--foot-frame toe', ['toe', 'sole']),
+        ('--seconds 0', ['--seconds', '0.1']),
+        ('-o demo.gif', ['.gif', '.png']),
+        ('-o none/demo.png', ['none']),
+        ('-o bad.csv.png --save none/walk', ['none']),
+        ('--save bad.csv', ['bad.csv', 'exists']),
+        ('--save kept.mcap', ['kept.mcap', '--force']),
+        ('--recording no.csv', ['no.csv']),
+        ('--recording bad.csv', ['bad.csv:3', 'column r_knee', "'nan'"]),
+    ],
+)
 def test_bad_input_is_one_line_and_exit_2(typed, named):
     positions = np.zeros((2, 12))
     positions[1, JOINTS.index('r_knee')] = np.nan

@@ -26,7 +26,8 @@ sympy = pytest.importorskip('sympy')
 FORMS = ['formula', 'decimals', 'exact']
 in_each_form = pytest.mark.parametrize('form', FORMS)
 
-LONG_ARM = """\
+LONG_ARM = (
+    """\
 units: {length: mm, angle: deg}
 chains:
   arm:
@@ -40,8 +41,10 @@ chains:
           - {a: 0, d: 0, alpha: 90, type: prismatic}
           - {a: 10, d: 0, alpha: 0}
           - {a: 0, d: 0, alpha: 90}
-""" + 9 * '          - {a: 0, d: 0, alpha: 0, type: prismatic}\n' + (
-    '          - {a: 10, d: 0, alpha: 0}\n')
+"""
+    + 9 * '          - {a: 0, d: 0, alpha: 0, type: prismatic}\n'
+    + ('          - {a: 10, d: 0, alpha: 0}\n')
+)
 """More than ten joints, of which 1 and 2 turn about parallel axes, and 12 turns too."""
 
 
@@ -81,9 +84,28 @@ def test_exact_numbers_are_the_chains_pose(case):
 
 def test_right_angles_and_lengths_are_exact():
     e = LEG.json('--symbolic', '--degrees', 0, 0, 0, -30, 0, 0)
-    assert [link['alpha'] for link in e['links']] == ['-pi/2', '-pi/2', 'pi/2', 'pi', '-pi/2', '0']
-    assert [link['theta'] for link in e['links']][:4] == ['pi/2', 'pi/2', '-pi/2', 'pi/3']
-    assert [link['a'] for link in e['links']] == ['0', '0', '-367/400', '-401/2', '0', '-1361/20']
+    assert [link['alpha'] for link in e['links']] == [
+        '-pi/2',
+        '-pi/2',
+        'pi/2',
+        'pi',
+        '-pi/2',
+        '0',
+    ]
+    assert [link['theta'] for link in e['links']][:4] == [
+        'pi/2',
+        'pi/2',
+        '-pi/2',
+        'pi/3',
+    ]
+    assert [link['a'] for link in e['links']] == [
+        '0',
+        '0',
+        '-367/400',
+        '-401/2',
+        '0',
+        '-1361/20',
+    ]
     assert not re.search(r'\d\.\d', json.dumps(e['T_root_tip']))
     assert sympy.sympify(e['T_root_tip'][2][0]) == sympy.sqrt(3) / 2
 
@@ -127,8 +149,9 @@ for form in ([], ['--json'], ['--latex']):
     assert main(['explain', 'left_leg', *form, *zeros]) == 0
 sys.exit(main(['explain', 'left_leg']))
 """
-    done = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True,
-                          timeout=60)
+    done = subprocess.run(
+        [sys.executable, '-c', program], capture_output=True, text=True, timeout=60
+    )
     assert done.returncode == 2, done.stderr
     assert done.stderr.count('\n') == 1 and 'pip install sympy' in done.stderr
 
@@ -181,8 +204,12 @@ def test_latex_takes_the_documents_and_no_line_is_too_long(tmp_path):
         head, _, body = latex(case, form).partition(begin)
         bodies.append(body.partition(end)[0])
     (tmp_path / 'e.tex').write_text(f'{head}{begin}{"".join(bodies)}{end}')
-    done = subprocess.run(['pdflatex', '-draftmode', '-interaction=nonstopmode', 'e.tex'],
-                          cwd=tmp_path, capture_output=True, timeout=60)
+    done = subprocess.run(
+        ['pdflatex', '-draftmode', '-interaction=nonstopmode', 'e.tex'],
+        cwd=tmp_path,
+        capture_output=True,
+        timeout=60,
+    )
     assert done.returncode == 0
     assert 'Overfull' not in (tmp_path / 'e.log').read_text(encoding='latin-1')
 
@@ -191,4 +218,7 @@ def test_minus_signs_and_spaces_in_latex():
     document = HEAD.explain('--latex', '--degrees', 0, 0, 0, -30, 0, 0)
     assert r'= (-0.5,\ 0,\ 0.866)' in document
     assert r'neck\_pitch $-$30 deg' in document
-    assert r'R_{z}(\theta _{0})\,t_{z}(d_{0})\,t_{x}(a_{0})\,R_{x}(\alpha _{0})' in document
+    assert (
+        r'R_{z}(\theta _{0})\,t_{z}(d_{0})\,t_{x}(a_{0})\,R_{x}(\alpha _{0})'
+        in document
+    )

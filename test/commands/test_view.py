@@ -42,8 +42,18 @@ from support.leg_fk_process import assert_one_line_complaint, COMMAND, run_main
 
 EXAMPLES = Path(__file__).resolve().parents[2] / 'config' / 'examples'
 WALK = EXAMPLES / 'synthetic_walk.csv'
-LEG_JOINTS = [f'{side}_{joint}' for side in 'lr' for joint in (
-    'hip_pitch', 'hip_roll', 'hip_yaw', 'knee', 'ankle_pitch', 'ankle_roll')]
+LEG_JOINTS = [
+    f'{side}_{joint}'
+    for side in 'lr'
+    for joint in (
+        'hip_pitch',
+        'hip_roll',
+        'hip_yaw',
+        'knee',
+        'ankle_pitch',
+        'ankle_roll',
+    )
+]
 _LISTENS = '0A'  # state of a socket in /proc/net/tcp
 BENT = np.radians([0, 10, 0, -30, -15, 5]).tolist()
 
@@ -51,8 +61,12 @@ BENT = np.radians([0, 10, 0, -30, -15, 5]).tolist()
 @contextmanager
 def running_view(*words):
     """Run the command without a browser until Ctrl-C; give the process and the page's address."""
-    process = subprocess.Popen([*COMMAND, 'view', '--no-browser', '--port', '0', *map(str, words)],
-                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [*COMMAND, 'view', '--no-browser', '--port', '0', *map(str, words)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
     try:
         process.stdout.readline()
         yield process, process.stdout.readline().split()[0]
@@ -107,8 +121,13 @@ def test_a_moved_slider_gives_the_numbers_of_pose_and_a_red_line(page):
     knee.press('Home')
     page.get_by_text('-150 deg is outside -124 .. 4 deg').wait_for()
     q = [0.0, 0.0, 0.0, math.radians(-150), 0.0, 0.0]
-    left, right = numbers_of_pose('left_leg', q), numbers_of_pose('right_leg', [0.0] * 6)
-    wait_until(page, lambda: numbers(' '.join(copied_texts(page))) == sorted(left + right))
+    left, right = (
+        numbers_of_pose('left_leg', q),
+        numbers_of_pose('right_leg', [0.0] * 6),
+    )
+    wait_until(
+        page, lambda: numbers(' '.join(copied_texts(page))) == sorted(left + right)
+    )
     page.get_by_role('button', name='back to the start').click()
     wait_until(page, lambda: knee.get_attribute('aria-valuenow') == '0')
 
@@ -125,7 +144,7 @@ def test_every_step_of_the_method_changes_the_scene(page):
 
 def test_nothing_listens_but_this_machine(view):
     process, address = view
-    (host, port), = listening_addresses(process.pid)
+    ((host, port),) = listening_addresses(process.pid)
     assert address == f'http://{host}:{port}/' == f'http://127.0.0.1:{port}/'
 
 
@@ -148,7 +167,7 @@ def listening_addresses(pid):
 
 def shown_address(host, port):
     """Return an address that the kernel prints as words of 32 bits in the machine's order."""
-    words = [bytes.fromhex(host[i:i + 8])[::-1] for i in range(0, len(host), 8)]
+    words = [bytes.fromhex(host[i : i + 8])[::-1] for i in range(0, len(host), 8)]
     family = socket.AF_INET if len(words) == 1 else socket.AF_INET6
     return socket.inet_ntop(family, b''.join(words)), int(port, 16)
 
@@ -167,8 +186,12 @@ def test_a_recording_is_played_and_paused(tab):
         time_line.press('End')
         last = np.genfromtxt(WALK, delimiter=',', names=True)[-1]
         q = [float(last[name]) for name in LEG_JOINTS]
-        expected = numbers_of_pose('left_leg', q[:6]) + numbers_of_pose('right_leg', q[6:])
-        wait_until(page, lambda: numbers(' '.join(copied_texts(page))) == sorted(expected))
+        expected = numbers_of_pose('left_leg', q[:6]) + numbers_of_pose(
+            'right_leg', q[6:]
+        )
+        wait_until(
+            page, lambda: numbers(' '.join(copied_texts(page))) == sorted(expected)
+        )
 
 
 def test_the_page_is_opened_and_its_address_printed(monkeypatch):
@@ -184,7 +207,10 @@ def test_the_page_is_opened_and_its_address_printed(monkeypatch):
         done = run_main('view', '--port', port)
     about, address = done.stdout.splitlines()
     assert done.returncode == 0
-    assert about == 'left_leg=v2_5, right_leg=v2_5 in root_link (x backward, y right, z up)'
+    assert (
+        about
+        == 'left_leg=v2_5, right_leg=v2_5 in root_link (x backward, y right, z up)'
+    )
     assert address.split()[0] == opened[0] != f'http://127.0.0.1:{port}/'
     assert f'note: port {port} is taken' in done.stderr
 
@@ -205,32 +231,41 @@ def test_the_page_is_updated_at_most_30_times_a_second(monkeypatch):
     assert times[-1] - times[0] > 6 / 30 - 1e-3
 
 
-@pytest.mark.parametrize(('words', 'complaint'), [
-    (['--host', '192.0.2.1'], "--host: found '192.0.2.1'"),
-    (['--port', '99999'], "found '99999', allowed: 1 to"),
-    (['--joint-topic', '/x'], '--joint-topic goes with --recording or --live'),
-    (['--recording', 'none.csv'], 'none.csv: there is no such file'),
-    (['--recording', 'a.csv', '--live'], 'not allowed with'),
-    (['left_leg=v3', 'right_leg=v1'], 'do not go together'),
-    (['left_legs'], "did you mean 'left_leg'?")])
+@pytest.mark.parametrize(
+    ('words', 'complaint'),
+    [
+        (['--host', '192.0.2.1'], "--host: found '192.0.2.1'"),
+        (['--port', '99999'], "found '99999', allowed: 1 to"),
+        (['--joint-topic', '/x'], '--joint-topic goes with --recording or --live'),
+        (['--recording', 'none.csv'], 'none.csv: there is no such file'),
+        (['--recording', 'a.csv', '--live'], 'not allowed with'),
+        (['left_leg=v3', 'right_leg=v1'], 'do not go together'),
+        (['left_legs'], "did you mean 'left_leg'?"),
+    ],
+)
 def test_mistakes_are_one_line(words, complaint):
     pytest.importorskip('viser')
     assert_one_line_complaint(run_main('view', *words), complaint)
 
 
-@pytest.mark.parametrize(('library', 'words', 'install'), [
-    ('viser', [], 'pip install viser'),
-    ('rclpy', ['--live'], 'source ROS 2')])
+@pytest.mark.parametrize(
+    ('library', 'words', 'install'),
+    [('viser', [], 'pip install viser'), ('rclpy', ['--live'], 'source ROS 2')],
+)
 def test_a_missing_library_is_named_with_its_mend(monkeypatch, library, words, install):
     monkeypatch.setitem(sys.modules, library, None)
     done = run_main('view', *words)
-    assert_one_line_complaint(done, f'needs {library}, which is not installed: {install}')
+    assert_one_line_complaint(
+        done, f'needs {library}, which is not installed: {install}'
+    )
 
 
 def test_a_topic_with_no_such_name_is_refused():
     pytest.importorskip('rclpy')
     done = run_main('view', '--live', '--joint-topic', '/joint states')
-    assert_one_line_complaint(done, "--joint-topic: found '/joint states'; topic name must not")
+    assert_one_line_complaint(
+        done, "--joint-topic: found '/joint states'; topic name must not"
+    )
 
 
 def test_a_live_robot_moves_the_chains():
@@ -242,7 +277,9 @@ def test_a_live_robot_moves_the_chains():
     node = rclpy.create_node('robot', context=context)
     publisher = node.create_publisher(messages.JointState, 'view_test/joint_states', 10)
     deadline = time.monotonic() + 10.0
-    message = messages.JointState(name=['other', *chain.joint_names], position=[9.0, *BENT])
+    message = messages.JointState(
+        name=['other', *chain.joint_names], position=[9.0, *BENT]
+    )
     with live_joints([chain], 'view_test/joint_states') as live:
         assert live.postures()[0].q is None
         while live.postures()[0].q is None and time.monotonic() < deadline:
@@ -266,7 +303,9 @@ def example(name):
 
 @settings(max_examples=25)
 @given(chains_and_positions())
-def test_a_row_leads_from_frame_to_frame_along_z_and_the_common_normal(chain_and_positions):
+def test_a_row_leads_from_frame_to_frame_along_z_and_the_common_normal(
+    chain_and_positions,
+):
     chain, (q, *_) = chain_and_positions
     posed = PosedChain(chain, q)
     method = Method(posed, 1.0)
@@ -274,10 +313,16 @@ def test_a_row_leads_from_frame_to_frame_along_z_and_the_common_normal(chain_and
         geometry = method.geometry(row)
         before, after = posed.frames[row], posed.frames[row + 1]
         path = np.vstack((geometry.d_ends, geometry.a_ends))
-        np.testing.assert_allclose(path[[0, 3]], [before[:3, 3], after[:3, 3]], atol=1e-12)
+        np.testing.assert_allclose(
+            path[[0, 3]], [before[:3, 3], after[:3, 3]], atol=1e-12
+        )
         np.testing.assert_allclose(path[1], path[2], atol=1e-12)
-        np.testing.assert_allclose(path[1] - path[0], geometry.d * before[:3, 2], atol=1e-12)
-        np.testing.assert_allclose(path[3] - path[2], geometry.a * after[:3, 0], atol=1e-12)
+        np.testing.assert_allclose(
+            path[1] - path[0], geometry.d * before[:3, 2], atol=1e-12
+        )
+        np.testing.assert_allclose(
+            path[3] - path[2], geometry.a * after[:3, 0], atol=1e-12
+        )
         for axis in (before[:3, 2], after[:3, 2]):
             assert abs(geometry.x @ axis) < 1e-12  # the normal is common to both
         x = turns_about(geometry.z, geometry.theta) @ before[:3, 0]
@@ -292,9 +337,15 @@ def test_a_row_of_a_modified_table_has_its_normal_first():
     for row, (before, after) in enumerate(zip(posed.frames[:-2], posed.frames[1:-1])):
         geometry = Method(posed, 1.0).geometry(row)
         path = np.vstack((geometry.a_ends, geometry.d_ends))
-        np.testing.assert_allclose(path[[0, 3]], [before[:3, 3], after[:3, 3]], atol=1e-12)
-        np.testing.assert_allclose(path[1] - path[0], geometry.a * before[:3, 0], atol=1e-12)
-        np.testing.assert_allclose(path[3] - path[2], geometry.d * after[:3, 2], atol=1e-12)
+        np.testing.assert_allclose(
+            path[[0, 3]], [before[:3, 3], after[:3, 3]], atol=1e-12
+        )
+        np.testing.assert_allclose(
+            path[1] - path[0], geometry.a * before[:3, 0], atol=1e-12
+        )
+        np.testing.assert_allclose(
+            path[3] - path[2], geometry.d * after[:3, 2], atol=1e-12
+        )
 
 
 @each_kind
@@ -304,7 +355,8 @@ def test_each_step_draws_what_it_is_about(name):
     scenes = [set(method.scene(step, 0)) for step in range(1, 7)]
     for letter, step in (('z', 1), ('x', 3), ('y', 4)):
         assert [f'method/{letter} axes' in scene for scene in scenes[:4]] == [
-            number >= step for number in range(1, 5)]
+            number >= step for number in range(1, 5)
+        ]
     has_origins = ['method/origins' in scene for scene in scenes]
     assert has_origins == [False, True, True, True, False, False]
     assert {'method/two frames', 'method/theta_0'} <= scenes[4]
@@ -378,12 +430,16 @@ def test_an_arc_ends_where_the_angle_leads(angle, direction):
     turned = max(-2 * math.pi, min(2 * math.pi, angle))
     np.testing.assert_allclose(points[0], [1.1, 1.0, 1.0])
     np.testing.assert_allclose(
-        points[-1], 1.0 + turns_about(axis, turned) @ [0.1, 0.0, 0.0], atol=1e-12)
+        points[-1], 1.0 + turns_about(axis, turned) @ [0.1, 0.0, 0.0], atol=1e-12
+    )
 
 
 def test_names_at_one_place_share_a_label():
     places = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1e-9, 0.0]])
-    assert [label.text for label in labels('x', 'abc', places, 1.0).values()] == ['a, c', 'b']
+    assert [label.text for label in labels('x', 'abc', places, 1.0).values()] == [
+        'a, c',
+        'b',
+    ]
 
 
 def test_forward_is_against_x_where_x_points_backward():
@@ -428,8 +484,15 @@ def rotation(roll, pitch, yaw):
 
 
 def test_a_recording_shows_the_newest_sample_and_how_old_it_is():
-    chain = Chain('slide', '', 'root', 'tip', ('x',),
-                  (DHLink(0.0, 0.0, 0.0, joint_type='prismatic'),), np.eye(4))
+    chain = Chain(
+        'slide',
+        '',
+        'root',
+        'tip',
+        ('x',),
+        (DHLink(0.0, 0.0, 0.0, joint_type='prismatic'),),
+        np.eye(4),
+    )
     times = np.array([1.0, 3.0, 2.0])  # the clock was set
     track = RecordedChain(chain, times, np.array([[0.1], [0.3], [0.2]]))
     assert track.posture(0.5) == (None, 'no pose yet')

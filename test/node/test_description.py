@@ -8,14 +8,23 @@ import pytest
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
-from support.described_robots import needs_real_robots, own_description, pinocchio_pose, REAL
+from support.described_robots import (
+    needs_real_robots,
+    own_description,
+    pinocchio_pose,
+    REAL,
+)
 from support.node_harness import BOTH, FEET, LEFT, LOSSLESS, NodeProcess, Robot, SECOND
 from support.node_oracle import oracle_pose, pose_matrix
 from support.robots import joint as a_joint
 from support.robots import robot as robot_of
 
 OK, WARN, ERROR, STALE = (
-    DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR, DiagnosticStatus.STALE)
+    DiagnosticStatus.OK,
+    DiagnosticStatus.WARN,
+    DiagnosticStatus.ERROR,
+    DiagnosticStatus.STALE,
+)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 Q = [0.2, 0.1, -0.1, -0.5, -0.3, 0.1, 0.15, 0.05, 0.1, -0.4, -0.2, -0.1]
 CRANE = robot_of([a_joint(0), a_joint(1)])
@@ -27,7 +36,9 @@ class DescribedRobot(Robot):
 
     def __init__(self, node):
         super().__init__(node)
-        self.descriptions = self.node.create_publisher(String, 'robot_description', LATCHED)
+        self.descriptions = self.node.create_publisher(
+            String, 'robot_description', LATCHED
+        )
         self.topic = f'{node.namespace}/robot_description'
         self.wait_for_log = node.wait_for_log
         self._log = node.log
@@ -40,7 +51,10 @@ class DescribedRobot(Robot):
         """Return the (4, 4) poses of both feet that answer a joint state."""
         self._stamp = self.connect(self._stamp) + 1000
         self.send(self._stamp, BOTH, Q)
-        return [pose_matrix(self.take(self.poses[tip], self._stamp)[-1].pose) for tip in FEET]
+        return [
+            pose_matrix(self.take(self.poses[tip], self._stamp)[-1].pose)
+            for tip in FEET
+        ]
 
     def send_now(self, joint_prefix=''):
         names = [joint_prefix + name for name in BOTH]
@@ -48,15 +62,19 @@ class DescribedRobot(Robot):
 
     def wait_for_status(self, level, words):
         """Wait until the left leg's status has this level and these words."""
+
         def is_so(statuses):
             status = statuses['left_leg']
             return status.level == level and words in status.message
+
         self.statuses(is_so, meanwhile=self.send_now)
 
     def wait_for_value(self, words):
         """Wait until the left leg's status says this of the description."""
-        self.statuses(lambda statuses: words in statuses['left_leg'].values['description'],
-                      meanwhile=self.send_now)
+        self.statuses(
+            lambda statuses: words in statuses['left_leg'].values['description'],
+            meanwhile=self.send_now,
+        )
 
     def said(self, severity):
         """Return what the node has said, from the text on."""
@@ -85,8 +103,10 @@ def mm_between_versions():
 @pytest.fixture(scope='module')
 def waiting():
     """Return a robot whose node computes with the description that it sends."""
-    with NodeProcess({'description_from_topic': True, **LOSSLESS}) as node, \
-            DescribedRobot(node) as robot:
+    with (
+        NodeProcess({'description_from_topic': True, **LOSSLESS}) as node,
+        DescribedRobot(node) as robot,
+    ):
         yield robot
 
 
@@ -99,15 +119,22 @@ def described(waiting):
 
 
 def test_it_waits_aloud(waiting):
-    waiting.wait_for_log('waiting for the description of the robot on '
-                         f'{waiting.topic} to publish poses of left_leg, right_leg')
-    silence = f'no description of the robot has come on {waiting.topic}; it has 1 publisher'
+    waiting.wait_for_log(
+        'waiting for the description of the robot on '
+        f'{waiting.topic} to publish poses of left_leg, right_leg'
+    )
+    silence = (
+        f'no description of the robot has come on {waiting.topic}; it has 1 publisher'
+    )
     waiting.wait_for_status(STALE, silence)
     waiting.wait_for_log(silence)
     assert not waiting.left
     result = waiting.change(version='v1')
     assert not result.successful
-    assert "version: found 'v1', allowed with description_from_topic: none" in result.reason
+    assert (
+        "version: found 'v1', allowed with description_from_topic: none"
+        in result.reason
+    )
 
 
 def test_poses_are_those_of_the_description_and_a_new_one_takes_effect(described):
@@ -117,7 +144,9 @@ def test_poses_are_those_of_the_description_and_a_new_one_takes_effect(described
     described.wait_for_value('robot_v1')
     poses = described.poses_now()
     assert_poses(poses, other)
-    np.testing.assert_allclose(poses[0], oracle_pose('left_leg', 'v1', Q[:6]), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(
+        poses[0], oracle_pose('left_leg', 'v1', Q[:6]), rtol=0, atol=1e-9
+    )
     said = described.said('INFO')
     assert any('(left_leg=urdf, root_link to l_foot_dh_frame)' in line for line in said)
     for name in ('robot_v2_5', 'robot_v1'):
@@ -135,17 +164,21 @@ def test_poses_of_real_robots(described, name):
     assert described.change(foot_frame='dh').successful
 
 
-@pytest.mark.parametrize(('bad', 'fault'), [
-    (GOOD[:len(GOOD) // 2], 'robot_description:'),
-    ('', 'robot_description:'),
-    (CRANE, "unknown chain 'left_leg'; known: l2"),
-    (own_description('v2_5', 'left_leg'), "unknown chain 'right_leg'"),
-], ids=['half', 'empty', 'another robot', 'one leg'])
+@pytest.mark.parametrize(
+    ('bad', 'fault'),
+    [
+        (GOOD[: len(GOOD) // 2], 'robot_description:'),
+        ('', 'robot_description:'),
+        (CRANE, "unknown chain 'left_leg'; known: l2"),
+        (own_description('v2_5', 'left_leg'), "unknown chain 'right_leg'"),
+    ],
+    ids=['half', 'empty', 'another robot', 'one leg'],
+)
 def test_one_that_cannot_be_used_changes_nothing(described, bad, fault):
     errors = len(described.said('ERROR'))
     described.describe(bad)
     described.wait_for_status(ERROR, 'description of the robot not used')
-    error, = described.said('ERROR')[errors:]
+    (error,) = described.said('ERROR')[errors:]
     assert fault in error
     assert error.endswith('; the one before stays')
     assert_poses(described.poses_now(), GOOD)
@@ -157,30 +190,39 @@ def test_a_second_publisher_is_a_warning(described):
     namespace = described.node.get_namespace()
     other = Node('other', namespace=namespace, context=described.node.context)
     other.create_publisher(String, 'robot_description', LATCHED)
-    described.wait_for_status(WARN, f'{described.topic} has 2 publishers, and the last '
-                              f'description counts: {namespace}/other, {namespace}/robot')
+    described.wait_for_status(
+        WARN,
+        f'{described.topic} has 2 publishers, and the last '
+        f'description counts: {namespace}/other, {namespace}/robot',
+    )
     other.destroy_node()
 
 
 @pytest.fixture(scope='module')
 def with_tables():
     """Return a robot whose node computes with tables, and looks for joints under a prefix."""
-    with NodeProcess({'joint_prefix': 'icub1/', **LOSSLESS}) as node, \
-            DescribedRobot(node) as robot:
+    with (
+        NodeProcess({'joint_prefix': 'icub1/', **LOSSLESS}) as node,
+        DescribedRobot(node) as robot,
+    ):
         yield robot
 
 
 def test_tables_are_held_against_the_description(with_tables):
     robot = with_tables
     robot.describe(GOOD)
-    robot.wait_for_log("right_leg: r_foot_dh_frame is up to 0.00 mm and 0.00 deg off the robot's")
+    robot.wait_for_log(
+        "right_leg: r_foot_dh_frame is up to 0.00 mm and 0.00 deg off the robot's"
+    )
     robot.describe(own_description('v1'))
     off = f'_foot_dh_frame is up to {mm_between_versions():.2f} mm and 0.00 deg off the robot'
     robot.wait_for_log(f'right_leg: r{off}')
     way = f"'s own; description_from_topic:=true computes with the description on {robot.topic}"
     robot.wait_for_log(way)
     assert [line for line in robot.said('WARN') if way in line] == [
-        f'left_leg: l{off}{way}', f'right_leg: r{off}{way}']
+        f'left_leg: l{off}{way}',
+        f'right_leg: r{off}{way}',
+    ]
     assert robot.change(version='v1').successful
     robot.wait_for_value('l_foot_dh_frame is up to 0.00 mm')
     assert robot.change(version='').successful
@@ -193,19 +235,29 @@ def test_a_difference_from_the_description_changes_no_level(with_tables):
     def are_compared(statuses):
         status = statuses['left_leg']
         return far in status.values['description'] and status.level == OK
+
     with_tables.statuses(are_compared, meanwhile=lambda: with_tables.send_now('icub1/'))
 
 
 def test_joint_names_without_the_prefix_are_explained(with_tables):
-    with_tables.wait_for_status(ERROR, "; 'l_hip_pitch' is looked for with joint_prefix:=\"\"")
+    with_tables.wait_for_status(
+        ERROR, '; \'l_hip_pitch\' is looked for with joint_prefix:=""'
+    )
 
 
 def test_a_urdf_is_a_kinematics_file(tmp_path):
     robots, parameters = tmp_path / 'robot.urdf', tmp_path / 'parameters.yaml'
     robots.write_text(GOOD)
     parameters.write_text('/**: {ros__parameters: {root_frame: odom}}')
-    with NodeProcess({'kinematics_file': str(robots), **LOSSLESS},
-                     ['--params-file', str(parameters)]) as node, DescribedRobot(node) as robot:
+    with (
+        NodeProcess(
+            {'kinematics_file': str(robots), **LOSSLESS},
+            ['--params-file', str(parameters)],
+        ) as node,
+        DescribedRobot(node) as robot,
+    ):
         assert_poses(robot.poses_now(), GOOD)
         [warning] = robot.said('WARN')
-    assert warning.startswith(f"root_frame not used: unknown link of {robots} 'odom'; known: ")
+    assert warning.startswith(
+        f"root_frame not used: unknown link of {robots} 'odom'; known: "
+    )

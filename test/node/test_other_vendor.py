@@ -19,7 +19,8 @@ from support.node_harness import BOTH, FEET, LOSSLESS, NodeProcess
 
 pytestmark = pytest.mark.skipif(
     find_spec('cyclonedds') is None,
-    reason="Cyclone DDS's Python is not installed: pip install cyclonedds")
+    reason="Cyclone DDS's Python is not installed: pip install cyclonedds",
+)
 
 CLIENT = Path(__file__).parents[1] / 'support' / 'cyclone_client.py'
 LOOPBACK_ALONE = """<CycloneDDS><Domain>
@@ -41,8 +42,14 @@ def client_answers(namespace, postures):
         'postures': postures.tolist(),
     }
     environment = {**os.environ, 'CYCLONEDDS_URI': LOOPBACK_ALONE}
-    client = subprocess.run([sys.executable, CLIENT], input=json.dumps(task), env=environment,
-                            capture_output=True, text=True, timeout=180)
+    client = subprocess.run(
+        [sys.executable, CLIENT],
+        input=json.dumps(task),
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=180,
+    )
     assert client.returncode == 0, client.stderr
     return json.loads(client.stdout)
 

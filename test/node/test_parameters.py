@@ -15,8 +15,16 @@ import yaml
 MS = 1_000_000  # ns
 Q = [0.2, 0.1, -0.1, -0.5, -0.3, 0.1, 0.15, 0.05, 0.1, -0.4, -0.2, -0.1]
 DEFAULTS = {parameter.name: parameter.default for parameter in PARAMETERS}
-READ_ONLY = ('chains', 'kinematics_file', 'description_from_topic', 'root_frame', 'joint_prefix')
-LIVE = {parameter.name: parameter.default for parameter in PARAMETERS if parameter.is_live}
+READ_ONLY = (
+    'chains',
+    'kinematics_file',
+    'description_from_topic',
+    'root_frame',
+    'joint_prefix',
+)
+LIVE = {
+    parameter.name: parameter.default for parameter in PARAMETERS if parameter.is_live
+}
 
 
 class Feet:
@@ -35,8 +43,10 @@ class Feet:
     def check(self, left='v2_5', right='v2_5', foot_frame='dh', frame_prefix=''):
         """Check that the next poses are those of these versions."""
         stamp = self.send()
-        sides = {'left_foot': ('left_leg', left, Q[:6]),
-                 'right_foot': ('right_leg', right, Q[6:])}
+        sides = {
+            'left_foot': ('left_leg', left, Q[:6]),
+            'right_foot': ('right_leg', right, Q[6:]),
+        }
         for tip, chain in sides.items():
             pose = self.robot.take(self.robot.poses[tip], stamp)[-1]
             assert_same_pose(pose, oracle_pose(*chain, foot_frame))
@@ -63,11 +73,18 @@ def feet(shared):
     assert result.successful, result.reason
 
 
-@pytest.mark.parametrize('changes, expected', [
-    ({'version': 'v1'}, {'left': 'v1', 'right': 'v1'}),
-    ({'frame_prefix': 'icub1/'}, {'frame_prefix': 'icub1/'}),
-    ({'foot_frame': 'sole', 'version': 'v3'}, {'left': 'v3', 'right': 'v3', 'foot_frame': 'sole'}),
-], ids=str)
+@pytest.mark.parametrize(
+    'changes, expected',
+    [
+        ({'version': 'v1'}, {'left': 'v1', 'right': 'v1'}),
+        ({'frame_prefix': 'icub1/'}, {'frame_prefix': 'icub1/'}),
+        (
+            {'foot_frame': 'sole', 'version': 'v3'},
+            {'left': 'v3', 'right': 'v3', 'foot_frame': 'sole'},
+        ),
+    ],
+    ids=str,
+)
 def test_change_shows_in_the_very_next_poses(feet, changes, expected):
     feet.check()
     result = feet.robot.change(**changes)
@@ -92,18 +109,28 @@ def test_joint_timeout_and_stamps_change_live(feet):
     robot.right.clear()
 
 
-@pytest.mark.parametrize('changes, words', [
-    ({'version': 'v2.5'}, "unknown version 'v2.5' of chain left_leg; did you mean 'v2_5'?"),
-    ({'version': 'v1', 'frame_prefix': 'x/', 'foot_frame': 'toe'}, 'allowed: dh or sole'),
-    ({'joint_timeout': float('nan')}, 'joint_timeout'),
-    ({'joint_timeout': -0.1}, 'joint_timeout'),
-    ({'version': 'v1', 'chains': ['left_leg']}, 'read-only'),
-    ({'kinematics_file': '/no/such.yaml'}, 'read-only'),
-    ({'version': 3}, 'type'),
-    ({'versoin': 'v1'}, 'undeclared'),
-    ({'version': 'v1', 'joint_timeout': None}, 'cannot be undeclared'),
-    ({'use_sim_time': 3}, 'type'),
-], ids=str)
+@pytest.mark.parametrize(
+    'changes, words',
+    [
+        (
+            {'version': 'v2.5'},
+            "unknown version 'v2.5' of chain left_leg; did you mean 'v2_5'?",
+        ),
+        (
+            {'version': 'v1', 'frame_prefix': 'x/', 'foot_frame': 'toe'},
+            'allowed: dh or sole',
+        ),
+        ({'joint_timeout': float('nan')}, 'joint_timeout'),
+        ({'joint_timeout': -0.1}, 'joint_timeout'),
+        ({'version': 'v1', 'chains': ['left_leg']}, 'read-only'),
+        ({'kinematics_file': '/no/such.yaml'}, 'read-only'),
+        ({'version': 3}, 'type'),
+        ({'versoin': 'v1'}, 'undeclared'),
+        ({'version': 'v1', 'joint_timeout': None}, 'cannot be undeclared'),
+        ({'use_sim_time': 3}, 'type'),
+    ],
+    ids=str,
+)
 def test_bad_set_is_refused_with_a_reason_and_changes_nothing(feet, changes, words):
     result = feet.robot.change(**changes)
     assert not result.successful
@@ -125,13 +152,17 @@ def test_every_parameter_is_described(feet):
     client = feet.robot.parameters()
     names = feet.robot.result(client.list_parameters()).result.names
     assert set(DEFAULTS) <= set(names)
-    described = feet.robot.result(client.describe_parameters(list(DEFAULTS))).descriptors
+    described = feet.robot.result(
+        client.describe_parameters(list(DEFAULTS))
+    ).descriptors
     for descriptor in described:
         assert descriptor.description.endswith('.'), descriptor.name
         assert descriptor.additional_constraints, descriptor.name
         assert descriptor.type != ParameterType.PARAMETER_NOT_SET
         assert descriptor.read_only == (descriptor.name in READ_ONLY)
-    [timeout] = [descriptor for descriptor in described if descriptor.name == 'joint_timeout']
+    [timeout] = [
+        descriptor for descriptor in described if descriptor.name == 'joint_timeout'
+    ]
     bounds = timeout.floating_point_range[0]
     assert (bounds.from_value, bounds.to_value) == (0.0, 1e6)
 
@@ -141,15 +172,23 @@ def test_no_pose_is_lost_or_mixed_while_parameters_change(feet):
     settings = list(itertools.product(('v1', 'v2_5', 'v3'), ('dh', 'sole')))
     sent = []
     for version, frame in settings * 3:
-        changes = {'version': version, 'foot_frame': frame, 'frame_prefix': f'{version}/{frame}/'}
+        changes = {
+            'version': version,
+            'foot_frame': frame,
+            'frame_prefix': f'{version}/{frame}/',
+        }
         future = robot.parameters().set_parameters_atomically(
-            [Parameter(name, value=value) for name, value in changes.items()])
+            [Parameter(name, value=value) for name, value in changes.items()]
+        )
         for _ in range(30):
             sent.append(feet.send())
             robot.spin()
         assert robot.result(future).result.successful
     frame_ids = []
-    for tip, chain, q in (('left_foot', 'left_leg', Q[:6]), ('right_foot', 'right_leg', Q[6:])):
+    for tip, chain, q in (
+        ('left_foot', 'left_leg', Q[:6]),
+        ('right_foot', 'right_leg', Q[6:]),
+    ):
         poses = robot.take(robot.poses[tip], sent[-1])
         assert poses.stamps() == sent
         frame_ids.append([pose.header.frame_id for pose in poses])
@@ -162,10 +201,17 @@ def test_no_pose_is_lost_or_mixed_while_parameters_change(feet):
 
 def test_chains_with_versions_of_another_file_are_given_at_start(tmp_path):
     text = config_file('icub_kinematics.yaml').read_text()
-    (tmp_path / 'longer.yaml').write_text(text.replace('[0,  0, 1,  -68.1]', '[0,  0, 1, -168.1]'))
-    parameters = {'kinematics_file': '~/longer.yaml', 'chains': ['left_leg=v1', 'right_leg']}
-    with NodeProcess(parameters | LOSSLESS, environment={'HOME': str(tmp_path)}) as node, \
-            Robot(node) as robot:
+    (tmp_path / 'longer.yaml').write_text(
+        text.replace('[0,  0, 1,  -68.1]', '[0,  0, 1, -168.1]')
+    )
+    parameters = {
+        'kinematics_file': '~/longer.yaml',
+        'chains': ['left_leg=v1', 'right_leg'],
+    }
+    with (
+        NodeProcess(parameters | LOSSLESS, environment={'HOME': str(tmp_path)}) as node,
+        Robot(node) as robot,
+    ):
         stamp = Feet(robot).send()
         expected = oracle_pose('left_leg', 'v1', Q[:6])
         expected[1, 3] -= 0.1

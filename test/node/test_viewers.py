@@ -14,20 +14,43 @@ import pytest
 import yaml
 
 CONFIG = Path(__file__).resolve().parents[2] / 'config'
-TOPICS = {f'/foot_pose_publisher/{name}'
-          for name in ('left_foot/pose', 'right_foot/pose', 'skeleton')}
+TOPICS = {
+    f'/foot_pose_publisher/{name}'
+    for name in ('left_foot/pose', 'right_foot/pose', 'skeleton')
+}
 # Keys that Lichtblick's public source reads, under packages/suite-base/src: PlotConfig in
 # panels/Plot/utils/config.ts, RendererConfig in panels/ThreeDeeRender/IRenderer.ts, those of
 # panels/DiagnosticSummary, and PANEL_TITLE_CONFIG_KEY in util/layout.ts. Foxglove's own is the
 # other title.
 TITLES = {'lichtblickPanelTitle', 'foxglovePanelTitle'}
 KEYS = {
-    'Plot': {'paths', 'isSynced', 'xAxisVal', 'showXAxisLabels', 'showYAxisLabels', 'showLegend',
-             'legendDisplay'},
-    '3D': {'followTf', 'followMode', 'scene', 'cameraState', 'topics', 'layers', 'transforms',
-           'publish', 'imageMode'},
-    'DiagnosticSummary': {'topicToRender', 'minLevel', 'pinnedIds', 'hardwareIdFilter',
-                          'sortByLevel'},
+    'Plot': {
+        'paths',
+        'isSynced',
+        'xAxisVal',
+        'showXAxisLabels',
+        'showYAxisLabels',
+        'showLegend',
+        'legendDisplay',
+    },
+    '3D': {
+        'followTf',
+        'followMode',
+        'scene',
+        'cameraState',
+        'topics',
+        'layers',
+        'transforms',
+        'publish',
+        'imageMode',
+    },
+    'DiagnosticSummary': {
+        'topicToRender',
+        'minLevel',
+        'pinnedIds',
+        'hardwareIdFilter',
+        'sortByLevel',
+    },
 }
 
 
@@ -58,18 +81,24 @@ def test_the_topics_of_the_layout_are_those_of_the_node(layout):
 
 def test_left_and_right_have_a_colour_each_and_their_names_in_every_viewer(layout):
     lines = layout['configById']['Plot!height']['paths']
-    for chain, line in zip(Configuration.checked(Catalog.load()).chains, lines, strict=True):
+    for chain, line in zip(
+        Configuration.checked(Catalog.load()).chains, lines, strict=True
+    ):
         assert f'/{chain.tip}/' in line['value']
         assert line['color'] == color_of(chain)
         markers = skeleton_markers(chain, [0.0] * 6, Time(), '').markers
         bones, name = markers[0], markers[2]
         rgb = bytes.fromhex(line['color'][1:])
-        assert (bones.color.r, bones.color.g, bones.color.b) == tuple(c / 255 for c in rgb)
+        assert (bones.color.r, bones.color.g, bones.color.b) == tuple(
+            c / 255 for c in rgb
+        )
         assert name.text == chain.tip
 
 
 def test_the_shipped_rviz_configuration_is_that_of_the_defaults():
-    shipped = yaml.safe_load((CONFIG / 'foot_poses.rviz').read_text())['Visualization Manager']
+    shipped = yaml.safe_load((CONFIG / 'foot_poses.rviz').read_text())[
+        'Visualization Manager'
+    ]
     assert shipped == rviz(Configuration.checked(Catalog.load()))
 
 
@@ -78,7 +107,9 @@ def test_rviz_subscribes_best_effort_and_draws_the_axes_of_a_foot_once():
     topics = [display['Topic'] for display in displays if 'Topic' in display]
     assert {topic['Value'] for topic in topics} == TOPICS
     assert {topic['Reliability Policy'] for topic in topics} == {'Best Effort'}
-    assert [display['Enabled'] for display in displays if display['Name'] == 'TF'] == [False]
+    assert [display['Enabled'] for display in displays if display['Name'] == 'TF'] == [
+        False
+    ]
 
 
 def test_rviz_shows_a_robot_of_any_size_in_its_namespace_and_frames():

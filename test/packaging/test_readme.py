@@ -14,11 +14,20 @@ import pytest
 import yaml
 
 ROOT = Path(__file__).parents[2]
-PAGES = {path.name: path.read_text() for path in (
-    ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', ROOT / 'QUALITY_DECLARATION.md',
-    ROOT / 'docs/index.rst', *sorted((ROOT / 'docs').glob('*.md')))}
+PAGES = {
+    path.name: path.read_text()
+    for path in (
+        ROOT / 'README.md',
+        ROOT / 'CONTRIBUTING.md',
+        ROOT / 'QUALITY_DECLARATION.md',
+        ROOT / 'docs/index.rst',
+        *sorted((ROOT / 'docs').glob('*.md')),
+    )
+}
 README = PAGES['README.md']
-LEG_FK = re.compile(r'(?:ros2 run icub_leg_fk |.*python -m icub_)?leg_fk (.*?)(?: > .*)?$')
+LEG_FK = re.compile(
+    r'(?:ros2 run icub_leg_fk |.*python -m icub_)?leg_fk (.*?)(?: > .*)?$'
+)
 NEEDS_ROS = re.compile(r'.*\bros2 |rosdep |colcon |\. install|python3 -m venv|~/')
 
 
@@ -47,8 +56,12 @@ def test_the_front_page_shows_commands_of_the_readme():
     assert set(shown) <= set(commands(README))
 
 
-ANSWERS = [block for text in PAGES.values() for block in blocks(text, 'text')
-           if block.startswith('$ leg_fk')]
+ANSWERS = [
+    block
+    for text in PAGES.values()
+    for block in blocks(text, 'text')
+    if block.startswith('$ leg_fk')
+]
 
 
 @pytest.mark.parametrize('block', ANSWERS)
@@ -71,15 +84,18 @@ def test_the_library_examples_run(page):
     example, *others = blocks(PAGES[page], 'python')
     names = {}
     exec(example, names)
-    assert names['T_root_sole'][:3, 3].tolist() == pytest.approx(list(names['leg'].pose(
-        names['q'])[:3]))
+    assert names['T_root_sole'][:3, 3].tolist() == pytest.approx(
+        list(names['leg'].pose(names['q'])[:3])
+    )
     assert names['J'].shape == (6, 6)
     assert names['poses'].shape == (1000, 7)
     for other in others:
         exec(other, {})
 
 
-def test_the_kinematics_files_shown_can_be_read_and_one_is_the_shipped_example(tmp_path):
+def test_the_kinematics_files_shown_can_be_read_and_one_is_the_shipped_example(
+    tmp_path,
+):
     shown = blocks(PAGES['kinematics_file.md'], 'yaml')
     assert shown[0].rstrip() == (ROOT / 'config/examples/ur5.yaml').read_text().rstrip()
     for block in shown:
@@ -102,13 +118,19 @@ def texts(module: Path) -> list[str]:
     nodes = list(ast.walk(ast.parse(module.read_text())))
     docstrings = [node.value for node in nodes if isinstance(node, ast.Expr)]
     constants = [node for node in nodes if isinstance(node, ast.Constant)]
-    return [node.value for node in constants
-            if isinstance(node.value, str) and node not in docstrings]
+    return [
+        node.value
+        for node in constants
+        if isinstance(node.value, str) and node not in docstrings
+    ]
 
 
 def test_every_message_explained_is_one_of_the_code():
-    code = '\n'.join(text for module in (ROOT / 'icub_leg_fk').rglob('*.py')
-                     for text in texts(module))
+    code = '\n'.join(
+        text
+        for module in (ROOT / 'icub_leg_fk').rglob('*.py')
+        for text in texts(module)
+    )
     messages = re.findall(r'^\| (.*?) \| ', PAGES['no_poses.md'], re.MULTILINE)
     assert len(messages) > 50
     for message in re.findall('`(.*?)`', '\n'.join(messages)):
@@ -125,7 +147,9 @@ def test_every_message_on_the_input_is_explained(module):
 
 
 def parameters() -> dict[str, object]:
-    (section,) = yaml.safe_load((ROOT / 'config/foot_pose_publisher.yaml').read_text()).values()
+    (section,) = yaml.safe_load(
+        (ROOT / 'config/foot_pose_publisher.yaml').read_text()
+    ).values()
     return section['ros__parameters']
 
 
@@ -146,15 +170,20 @@ def test_links_and_pictures_lead_somewhere(page):
         file, _, anchor = target.partition('#')
         assert not file or (folder / file).is_file(), target
         text = (folder / file).read_text() if file.endswith('.md') else PAGES[page]
-        anchors = {re.sub(r'[^a-z0-9 _-]', '', line.lstrip('# ').lower()).replace(' ', '-')
-                   for line in text.splitlines() if line.startswith('#')}
+        anchors = {
+            re.sub(r'[^a-z0-9 _-]', '', line.lstrip('# ').lower()).replace(' ', '-')
+            for line in text.splitlines()
+            if line.startswith('#')
+        }
         assert not anchor or anchor in anchors, target
 
 
 def script(page: str) -> str:
     """Return what somebody without ROS types who follows a page; the rest is told."""
     lines = ['set -ex', '. .venv/bin/activate']
-    kinds = re.findall(r'^```(console|python)\n(.*?)^```', PAGES[page], re.DOTALL | re.MULTILINE)
+    kinds = re.findall(
+        r'^```(console|python)\n(.*?)^```', PAGES[page], re.DOTALL | re.MULTILINE
+    )
     for kind, block in kinds:
         if kind == 'python':
             lines.append(f"python - <<'END'\n{block}END")
@@ -180,16 +209,30 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def type_in(folder: Path, lines: str) -> None:
     """Run lines of a shell that knows nothing of this run's environment."""
-    environment = {name: value for name, value in os.environ.items()
-                   if name in ('PATH', 'HOME', 'LANG', 'ROS_DOMAIN_ID',
-                               'ROS_AUTOMATIC_DISCOVERY_RANGE') or name.startswith('PIP_')}
-    subprocess.run(['bash', '-c', lines], cwd=folder, env=environment, stdout=sys.stdout,
-                   stderr=sys.stderr, check=True)
+    environment = {
+        name: value
+        for name, value in os.environ.items()
+        if name
+        in ('PATH', 'HOME', 'LANG', 'ROS_DOMAIN_ID', 'ROS_AUTOMATIC_DISCOVERY_RANGE')
+        or name.startswith('PIP_')
+    }
+    subprocess.run(
+        ['bash', '-c', lines],
+        cwd=folder,
+        env=environment,
+        stdout=sys.stdout,
+        stderr=sys.stderr,
+        check=True,
+    )
 
 
-@pytest.mark.skipif('README_BLOCKS' not in os.environ,
-                    reason='sets up a fresh environment, for minutes: make readme')
-@pytest.mark.parametrize('page', [page for page, text in PAGES.items() if blocks(text, 'console')])
+@pytest.mark.skipif(
+    'README_BLOCKS' not in os.environ,
+    reason='sets up a fresh environment, for minutes: make readme',
+)
+@pytest.mark.parametrize(
+    'page', [page for page, text in PAGES.items() if blocks(text, 'console')]
+)
 def test_every_block_works_in_order_in_a_fresh_clone(page, clone):
     subprocess.run(['git', 'clean', '-xfdq', '--exclude=.venv'], cwd=clone, check=True)
     type_in(clone, script(page))

@@ -79,6 +79,7 @@ def after(names):
         if urdf.name == 'refused':
             raise LegFKError('it is refused')
         used.append(urdf.name)
+
     description = Description(TOPIC, use)
     for name in names:
         text = (GOOD | BAD)[name]
@@ -86,7 +87,9 @@ def after(names):
     return description, used
 
 
-@pytest.mark.parametrize('data', [b'', b'\0\1\0\0', string('x')[:-1], string('x' * 9)[:12]])
+@pytest.mark.parametrize(
+    'data', [b'', b'\0\1\0\0', string('x')[:-1], string('x' * 9)[:12]]
+)
 def test_bytes_that_are_no_string_are_a_fault(data):
     description = Description(TOPIC, lambda urdf: None)
     description.take(data)
@@ -106,7 +109,8 @@ def test_who_computes_with_tables_is_told_how_far_they_are():
     description = described(own_description('v2_5'))
     assert texts(description) == [
         "left_leg: l_foot_dh_frame is up to 0.00 mm and 0.00 deg off the robot's own",
-        "right_leg: r_foot_dh_frame is up to 0.00 mm and 0.00 deg off the robot's own"]
+        "right_leg: r_foot_dh_frame is up to 0.00 mm and 0.00 deg off the robot's own",
+    ]
     assert description.notes(['/one', '/two']) == []
     description.configure(Configuration.checked(TABLES, chains=['left_leg=v1']))
     [line] = texts(description)
@@ -120,7 +124,9 @@ def test_from_a_millimetre_on_it_is_another_robot(mm, is_far):
     leg = TABLES.chain('left_leg', 'v2_5')
     moved = replace(leg, T_root_0=translation(0, 0, mm / 1000) @ leg.T_root_0)
     assert compared(moved, urdf(own_description('v2_5'))) == (
-        f"l_foot_dh_frame is up to {mm:.2f} mm and 0.00 deg off the robot's own", is_far)
+        f"l_foot_dh_frame is up to {mm:.2f} mm and 0.00 deg off the robot's own",
+        is_far,
+    )
 
 
 @pytest.mark.parametrize(('deg', 'is_far'), [(0.099, False), (0.101, True)])
@@ -146,19 +152,33 @@ def test_real_robots():
     for leg in legs:
         found = compared(leg, urdf(REAL['iCubGenova04'].read_text()))
         assert (found.text[1:26], found.is_far) == ('_foot_dh_frame is up to 1', True)
-    v3 = compared(TABLES.chain('right_leg', 'v3'), urdf(REAL['iCubGenova09'].read_text()))
+    v3 = compared(
+        TABLES.chain('right_leg', 'v3'), urdf(REAL['iCubGenova09'].read_text())
+    )
     assert v3 == ("r_sole is up to 0.00 mm and 0.00 deg off the robot's own", False)
 
 
-@pytest.mark.parametrize(('text', 'reason'), [
-    (robot([joint(0)]), f'no frame root_link in {TOPIC}'),
-    (robot([joint(0)]).replace('l0', 'root_link'),
-     f'no frame l_foot_dh_frame or l_sole in {TOPIC}'),
-    (robot([joint(0)]).replace('l0', 'root_link').replace('l1', 'l_sole'),
-     f'the joints from root_link to l_sole are j0 in {TOPIC}'),
-    (robot([joint(0, 'floating')]).replace('l0', 'root_link').replace('l1', 'l_sole'),
-     f"{TOPIC}: joint 'j0' is floating; allowed: revolute, continuous, prismatic, fixed"),
-], ids=['root', 'tip', 'joints', 'type'])
+@pytest.mark.parametrize(
+    ('text', 'reason'),
+    [
+        (robot([joint(0)]), f'no frame root_link in {TOPIC}'),
+        (
+            robot([joint(0)]).replace('l0', 'root_link'),
+            f'no frame l_foot_dh_frame or l_sole in {TOPIC}',
+        ),
+        (
+            robot([joint(0)]).replace('l0', 'root_link').replace('l1', 'l_sole'),
+            f'the joints from root_link to l_sole are j0 in {TOPIC}',
+        ),
+        (
+            robot([joint(0, 'floating')])
+            .replace('l0', 'root_link')
+            .replace('l1', 'l_sole'),
+            f"{TOPIC}: joint 'j0' is floating; allowed: revolute, continuous, prismatic, fixed",
+        ),
+    ],
+    ids=['root', 'tip', 'joints', 'type'],
+)
 def test_what_cannot_be_compared_says_why(text, reason):
     found = compared(TABLES.chain('left_leg'), urdf(text))
     assert found == (f'not compared: {reason}', False)
@@ -167,10 +187,19 @@ def test_what_cannot_be_compared_says_why(text, reason):
 def test_transforms_that_the_description_has_are_a_warning():
     def warnings(**values):
         description = described(own_description('v2_5'), **values)
-        return [note.text for note in description.announcement() if note.key == 'shared_frames']
+        return [
+            note.text
+            for note in description.announcement()
+            if note.key == 'shared_frames'
+        ]
+
     [line] = warnings(publish_tf=True)
-    assert line.startswith('publish_tf sends l_foot_dh_frame and r_foot_dh_frame, which the descr')
+    assert line.startswith(
+        'publish_tf sends l_foot_dh_frame and r_foot_dh_frame, which the descr'
+    )
     assert warnings() == []
     assert warnings(publish_tf=True, frame_prefix='fk/') == []
-    assert 'sends l_sole, which' in warnings(
-        publish_tf=True, chains=['left_leg'], foot_frame='sole')[0]
+    assert (
+        'sends l_sole, which'
+        in warnings(publish_tf=True, chains=['left_leg'], foot_frame='sole')[0]
+    )

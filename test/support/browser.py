@@ -11,7 +11,12 @@ import pytest
 _PROGRAMS = ('chromium', 'chromium-browser', 'google-chrome')
 _ARGUMENTS = ('--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader')
 _WINDOW = {'width': 1000, 'height': 480}  # the fewer pixels the faster
-_SCENE = {'x': 460, 'y': 180, 'width': 200, 'height': 300}  # between panels and messages
+_SCENE = {
+    'x': 460,
+    'y': 180,
+    'width': 200,
+    'height': 300,
+}  # between panels and messages
 _TIMEOUT = 20.0  # s; software draws slowly on a busy machine
 
 
@@ -33,7 +38,9 @@ def running_tab() -> Iterator[Any]:
 def show_page(tab: Any, address: str) -> Any:
     """Let a tab show a page of viser, if it does not yet, and return it."""
     if not tab.url.startswith(address):
-        tab.goto(f'{address}?fixedDpr=1')  # else viser draws fewer pixels while it is slow
+        tab.goto(
+            f'{address}?fixedDpr=1'
+        )  # else viser draws fewer pixels while it is slow
         tab.get_by_role('tab', name='Poses').wait_for()
     return tab
 

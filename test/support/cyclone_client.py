@@ -23,7 +23,9 @@ from cyclonedds.util import duration
 DEADLINE = 60.0  # s
 AGAIN = duration(milliseconds=100)
 SILENCE = duration(seconds=20)
-LOSSLESS = Qos(Policy.Reliability.Reliable(max_blocking_time=SILENCE), Policy.History.KeepAll)
+LOSSLESS = Qos(
+    Policy.Reliability.Reliable(max_blocking_time=SILENCE), Policy.History.KeepAll
+)
 
 
 @dataclass
@@ -80,7 +82,9 @@ class Client:
     def __init__(self, domain, namespace, feet, names):
         participant = DomainParticipant(domain)
         prefix = f'rt{namespace}'  # as ROS names its topics in DDS
-        joint_states = Topic(participant, f'{prefix}/joint_states', JointState, qos=LOSSLESS)
+        joint_states = Topic(
+            participant, f'{prefix}/joint_states', JointState, qos=LOSSLESS
+        )
         self._writer = DataWriter(participant, joint_states, qos=LOSSLESS)
         self._names = names
         self._readers = {}
@@ -111,7 +115,9 @@ class Client:
         return answers
 
     def _send(self, stamp, positions):
-        self._writer.write(JointState(Header(stamp, ''), self._names, positions, [], []))
+        self._writer.write(
+            JointState(Header(stamp, ''), self._names, positions, [], [])
+        )
 
 
 def received(reader, first, last):

@@ -34,5 +34,7 @@ def pinocchio_pose(text, root, tip, positions):
     for name, value in positions.items():
         q[model.joints[model.getJointId(name)].idx_q] = value
     pin.framesForwardKinematics(model, data, q)
-    T_root, T_tip = [data.oMf[model.getFrameId(link, pin.FrameType.BODY)] for link in (root, tip)]
+    T_root, T_tip = [
+        data.oMf[model.getFrameId(link, pin.FrameType.BODY)] for link in (root, tip)
+    ]
     return np.array((T_root.inverse() * T_tip).homogeneous)

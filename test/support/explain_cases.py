@@ -37,7 +37,10 @@ def _worked_out_once(chain, q, *, exact):
 
 @cache
 def _explain(*words):
-    with patch.object(command, 'explain', _worked_out_once), redirect_stdout(StringIO()) as output:
+    with (
+        patch.object(command, 'explain', _worked_out_once),
+        redirect_stdout(StringIO()) as output,
+    ):
         assert main(['explain', *words]) == 0
     return output.getvalue()
 
@@ -74,8 +77,12 @@ PANDA = Case('panda', 'flange', EXAMPLES / 'panda.yaml')
 ODD = Case('odd_arm', 'sole', ODD_ARM)
 
 OF_EACH_KIND = [LEG, Case('right_leg=v3', 'sole'), HEAD, ARM, UR5, PANDA, ODD]
-LEGS = [Case(f'{side}_leg={version}', frame) for side in ('left', 'right')
-        for version in ('v1', 'v2_5', 'v3') for frame in ('dh', 'sole')]
+LEGS = [
+    Case(f'{side}_leg={version}', frame)
+    for side in ('left', 'right')
+    for version in ('v1', 'v2_5', 'v3')
+    for frame in ('dh', 'sole')
+]
 
 
 def _name(case):
@@ -83,7 +90,8 @@ def _name(case):
 
 
 every_chain = pytest.mark.parametrize(
-    'case', [*LEGS, HEAD, ARM, UR5, PANDA, ODD, ODD._replace(frame='dh')], ids=_name)
+    'case', [*LEGS, HEAD, ARM, UR5, PANDA, ODD, ODD._replace(frame='dh')], ids=_name
+)
 one_chain_of_each_kind = pytest.mark.parametrize('case', OF_EACH_KIND, ids=_name)
 
 

@@ -25,7 +25,9 @@ class LegInput(JointInput):
         sec, nanosec = divmod(START + ms * MS, 1_000_000_000)
         if positions is None:
             positions = [-0.01 * i for i in range(len(names))]
-        message = Message(sec, nanosec, tuple(names), tuple(positions), tuple(velocities), **more)
+        message = Message(
+            sec, nanosec, tuple(names), tuple(positions), tuple(velocities), **more
+        )
         return self.feed(message.cdr())
 
     def ready(self, *args, **kwargs):
