@@ -62,39 +62,32 @@ def measure_kinematics(report: Report, quick: bool) -> None:
         report.note(f'  Pinocchio: not measured: {error}')
     one: dict[str, list[float]] = {name: [] for name in ways}
     many, loop = [], []
-    out = np.empty((len(few), 7))
-
-    def call(pose: One, vectors: Any) -> None:
-        for q in vectors:
-            pose(q)
-
-    def fill(pose: One, vectors: Any) -> None:
-        for i, q in enumerate(vectors):
-            out[i] = pose(q)
-
     for _ in range(3 if quick else _READINGS):
         for name, (pose, vectors) in ways.items():
-            one[name].append(_microseconds(len(few), call, pose, vectors))
+            one[name].append(_microseconds(len(few), _call, pose, vectors))
         many.append(_microseconds(len(Q), chain.poses, Q))
         if 'Pinocchio' in ways:
-            loop.append(_microseconds(len(few), fill, *ways['Pinocchio']))
+            loop.append(_microseconds(len(few), _fill, *ways['Pinocchio']))
     for name, readings in one.items():
         report.row(f'one pose, {name}', readings, 'us')
     report.row('many poses, each, here', many, 'us')
     if loop:
         report.row('many poses, each, a loop over Pinocchio', loop, 'us')
-        report.row(
-            'one pose / Pinocchio',
-            ratio(one['here'], one['Pinocchio']),
-            'x',
-            at_most=6.0,
-        )
-        report.row(
-            'many poses, loop over Pinocchio / here',
-            ratio(loop, many),
-            'x',
-            at_least=4.0,
-        )
+        ratios = ratio(one['here'], one['Pinocchio'])
+        report.row('one pose / Pinocchio', ratios, 'x', at_most=6.0)
+        ratios = ratio(loop, many)
+        report.row('many poses, loop over Pinocchio / here', ratios, 'x', at_least=4.0)
+
+
+def _call(pose: One, vectors: Any) -> None:
+    for q in vectors:
+        pose(q)
+
+
+def _fill(pose: One, vectors: Any) -> None:
+    out = np.empty((len(vectors), 7))
+    for i, q in enumerate(vectors):
+        out[i] = pose(q)
 
 
 def _microseconds(count: int, work: Callable[..., object], *arguments: Any) -> float:
