@@ -178,6 +178,9 @@ def test_links_and_pictures_lead_somewhere(page):
         assert not anchor or anchor in anchors, target
 
 
+RUNS_UNTIL_CTRL_C = ('foot_pose_publisher', 'leg_fk view')
+
+
 def script(page: str) -> str:
     """Return what somebody without ROS types who follows a page; the rest is told."""
     lines = ['set -ex', '. .venv/bin/activate']
@@ -191,7 +194,7 @@ def script(page: str) -> str:
         for command in commands(block):
             if NEEDS_ROS.match(command):
                 print('passed over:', command)
-            elif command.startswith('foot_pose_publisher'):
+            elif command.startswith(RUNS_UNTIL_CTRL_C):
                 lines.append(f'timeout --preserve-status --signal=INT 5 {command}')
             else:
                 lines.append(command)
