@@ -286,7 +286,7 @@ def test_failed_picture_leaves_nothing_behind(walking_csv, monkeypatch):
 
     monkeypatch.setattr(Figure, 'savefig', fail)
     assert_one_line_complaint(
-        run_main('plot', 'walking.csv'), 'No space left on device'
+        run_main('plot', 'walking.csv'), 'no space left on device'
     )
     assert [path.name for path in Path().iterdir()] == ['walking.csv']
 
