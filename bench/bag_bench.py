@@ -15,7 +15,7 @@ from typing import NamedTuple
 from bench.joint_messages import joint_positions, ROBOT_JOINTS
 from bench.report import ratio, Report, resident_bytes
 from icub_leg_fk.errors import LegFKError
-from icub_leg_fk.tools.bags import JOINT_STATE
+from icub_leg_fk.stream.cdr import JOINT_STATE
 from icub_leg_fk.tools.recording import write_joint_states
 import numpy as np
 from rosbags.typesys import get_typestore, Stores

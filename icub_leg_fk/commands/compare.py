@@ -43,7 +43,7 @@ _HEADER = ('chain', 'version', 'frame', 'mm', 'deg', 'fit mm', 'fit deg', '')
 _NUMBERS = range(3, 7)  # the columns of numbers
 
 
-class Comparison(NamedTuple):
+class FrameComparison(NamedTuple):
     """A table's tip compared with a robot's frame of that name.
 
     Attributes:
@@ -121,13 +121,13 @@ def run(args: argparse.Namespace) -> int:
 
 def _compare_all(
     catalog: Catalog, names: Sequence[str], urdf: Urdf
-) -> tuple[list[Comparison], dict[str, str]]:
+) -> tuple[list[FrameComparison], dict[str, str]]:
     """Return the comparisons of some chains, and why the others are not compared, by name.
 
     Raises:
         InputFileError: no chain can be compared.
     """
-    found: list[Comparison] = []
+    found: list[FrameComparison] = []
     not_compared: dict[str, str] = {}
     for name in names:
         rows, reason = _compare_chain(catalog, name, urdf)
@@ -148,9 +148,9 @@ def _compare_all(
 
 def _compare_chain(
     catalog: Catalog, name: str, urdf: Urdf
-) -> tuple[list[Comparison], str]:
+) -> tuple[list[FrameComparison], str]:
     """Return the comparisons of a chain's versions, and why there is none if there is none."""
-    rows: list[Comparison] = []
+    rows: list[FrameComparison] = []
     reasons: list[str] = []
     for table in _versions(catalog, name):
         frames = []
@@ -159,7 +159,7 @@ def _compare_chain(
             reasons.append(reason)
             if not reason:
                 frames.append(frame)
-        rows += compared(table, frames, urdf)
+        rows += compare_frames(table, frames, urdf)
     return rows, reasons[0]
 
 
@@ -171,13 +171,15 @@ def _versions(catalog: Catalog, name: str) -> list[Chain]:
     return list(catalog.entry(chain).versions.values())
 
 
-def compared(table: Chain, frames: Sequence[str], urdf: Urdf) -> list[Comparison]:
+def compare_frames(
+    table: Chain, frames: Sequence[str], urdf: Urdf
+) -> list[FrameComparison]:
     """Return how far a table is from a robot, for some of its tip frames.
 
     The constants that fit best are those of the first frame: another frame of the same body only
     moves them.
     """
-    rows: list[Comparison] = []
+    rows: list[FrameComparison] = []
     positions = postures(table, _SAMPLES, _REACH, whole_range=False)
     fitted, root_turn, X = None, '', np.eye(4)
     for frame in frames:
@@ -192,7 +194,7 @@ def compared(table: Chain, frames: Sequence[str], urdf: Urdf) -> list[Comparison
             root_turn = turn_in_words(X[:3, :3]) if fitted.deg <= _NEAR else ''
         turn = turn_of_axes(X @ ours if root_turn else ours, theirs)
         rows.append(
-            Comparison(
+            FrameComparison(
                 chain,
                 distance(ours @ turn, theirs),
                 turn_in_words(turn[:3, :3]),
@@ -235,8 +237,8 @@ def _lacks(urdf: Urdf, chain: Chain) -> str:
     return ''
 
 
-def _nearest_of_each_chain(rows: Sequence[Comparison]) -> list[Comparison]:
-    nearest: dict[str, Comparison] = {}
+def _nearest_of_each_chain(rows: Sequence[FrameComparison]) -> list[FrameComparison]:
+    nearest: dict[str, FrameComparison] = {}
     for row in rows:
         best = nearest.setdefault(row.chain.name, row)
         if row.score < best.score:
@@ -244,7 +246,7 @@ def _nearest_of_each_chain(rows: Sequence[Comparison]) -> list[Comparison]:
     return list(nearest.values())
 
 
-def _summary(row: Comparison, rows: Sequence[Comparison]) -> str:
+def _summary(row: FrameComparison, rows: Sequence[FrameComparison]) -> str:
     """Return how near a robot's chain is to the nearest version of the tables."""
     chain, direct, fitted = row.chain, row.direct, row.fitted
     off = f'{_short(direct.mm)} mm'
@@ -268,7 +270,7 @@ def _summary(row: Comparison, rows: Sequence[Comparison]) -> str:
     return f'{chain.name}: {words}{_other_axes(row, rows)}'
 
 
-def _other_axes(row: Comparison, rows: Sequence[Comparison]) -> str:
+def _other_axes(row: FrameComparison, rows: Sequence[FrameComparison]) -> str:
     """Return which frames of a version have other axes than the robot's of their name."""
     words = ''
     for other in rows:
@@ -288,7 +290,7 @@ def _is_near(found: Difference) -> bool:
 
 
 def _what_to_run(
-    nearest: Sequence[Comparison], urdf: Urdf, args: argparse.Namespace
+    nearest: Sequence[FrameComparison], urdf: Urdf, args: argparse.Namespace
 ) -> list[str]:
     """Return what to run for this robot, ready to paste."""
     chains = [row.chain for row in nearest]
@@ -343,7 +345,7 @@ def _table(rows: Sequence[Sequence[str]]) -> list[str]:
     return lines
 
 
-def _cells(row: Comparison, is_nearest: bool) -> list[str]:
+def _cells(row: FrameComparison, is_nearest: bool) -> list[str]:
     fits = ['-', '-']
     if row.fitted:
         fits = [_number(row.fitted.mm), _number(row.fitted.deg)]
@@ -362,7 +364,7 @@ def _number(value: float) -> str:
     return f'{value:.1f}' if value >= 10 else f'{value:.3f}'
 
 
-def _as_json(row: Comparison, is_nearest: bool) -> dict[str, Any]:
+def _as_json(row: FrameComparison, is_nearest: bool) -> dict[str, Any]:
     mm, deg = _pairs(row.direct)
     fitted_mm, fitted_deg = _pairs(row.fitted) if row.fitted else (None, None)
     return {

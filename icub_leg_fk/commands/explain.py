@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the explanation."""
-    _, chain = options.load_chain(args)
+    chain = options.chosen_chain(args)
     explanation = explain(
         chain, options.joint_positions(args, chain), exact=args.symbolic
     )

@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the pose."""
-    _, chain = options.load_chain(args)
+    chain = options.chosen_chain(args)
     q = options.joint_positions(args, chain) or []
     T = chain.forward(q) + 0.0  # no negative zeros
     quaternion = [value + 0.0 for value in chain.pose(q)[3:]]

@@ -74,7 +74,7 @@ def read_kinematics_file(
     Raises:
         CatalogError: the file cannot be read or has a mistake.
     """
-    reader = _Reader()
+    reader = _FileReader()
     file, chains = reader.chains(path)
     return file, chains, tuple(dict.fromkeys(reader.warnings))
 
@@ -85,7 +85,7 @@ def listed(names: Iterable[str]) -> str:
     return shown if len(shown) <= 60 else f'{shown[:57]}...'
 
 
-class _Reader:
+class _FileReader:
     """Reads one kinematics file; units and warnings are known on the way."""
 
     def __init__(self) -> None:

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from icub_leg_fk.node.outputs import pose_topic
+from icub_leg_fk.stream.cdr import JOINT_STATE
 from icub_leg_fk.stream.configuration import Configuration
 from icub_leg_fk.stream.description import Description, UNUSABLE
 from icub_leg_fk.stream.joint_input import (
@@ -19,11 +20,10 @@ from icub_leg_fk.stream.joint_input import (
     REJECTIONS,
     TIME_JUMP,
 )
-from icub_leg_fk.stream.notes import ERROR, INFO, listed, Note, notes_of, WARNING
+from icub_leg_fk.stream.notes import ERROR, INFO, joints_found, Note, notes_of, WARNING
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-JOINT_STATE = 'sensor_msgs/msg/JointState'
 POSE_STAMPED = 'geometry_msgs/msg/PoseStamped'
 STRING = 'std_msgs/msg/String'
 PATIENCE = 5  # looks that some notes must last before they are logged
@@ -237,7 +237,7 @@ class Health:
             **self._totals.values(chain.name),
         }
         for reason, joints in sorted(chain_look.joints.items()):
-            values[f'{reason} joints'] = listed(reason, joints)
+            values[f'{reason} joints'] = joints_found(reason, joints)
         return [KeyValue(key=key, value=str(value)) for key, value in values.items()]
 
 

@@ -19,6 +19,7 @@ from typing import NamedTuple, NoReturn
 from icub_leg_fk.errors import MalformedMessageError
 from icub_leg_fk.kinematics.solver import Pose
 
+JOINT_STATE = 'sensor_msgs/msg/JointState'
 BYTE_ORDERS = {b'\x00\x01': '<', b'\x00\x00': '>'}
 HEADER = 4  # bytes of the encapsulation, from whose end alignment counts
 STAMP_END = 12  # encapsulation and stamp; frame_id follows
@@ -64,7 +65,7 @@ def read_layout(data: bytes) -> JointStateLayout:
         MalformedMessageError: the bytes end too early, a length is absurd, or the encoding is
             not plain CDR; names the field.
     """
-    reader = _Reader(data, 'JointState')
+    reader = _Cursor(data, 'JointState')
     reader.take('header.stamp', 8)
     frame_id = reader.string('header.frame_id')
     # A string takes at least its length field: no more of them than a quarter of the rest.
@@ -92,7 +93,7 @@ def read_string(data: bytes) -> bytes:
     Raises:
         MalformedMessageError: the bytes are no String.
     """
-    return _Reader(data, 'String').text('data')
+    return _Cursor(data, 'String').text('data')
 
 
 class _StampedEncoder:
@@ -154,7 +155,7 @@ class TFMessageEncoder:
         return self._pack(_ENCAPSULATION, len(self._frames), *fields)
 
 
-class _Reader:
+class _Cursor:
     """A position in the bytes of a message that refuses to move past their end."""
 
     def __init__(self, data: bytes, message: str) -> None:

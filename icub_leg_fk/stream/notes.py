@@ -77,7 +77,7 @@ def names_that_came(look: Look) -> str:
     return ', '.join(names) or 'none'
 
 
-def listed(reason: str, joints: Mapping[str, float]) -> str:
+def joints_found(reason: str, joints: Mapping[str, float]) -> str:
     """Return the joints that a reason concerns, with what was found of each."""
     words = []
     for joint, value in joints.items():
@@ -117,7 +117,7 @@ def _of_messages(look: Look, on_topic: str) -> Iterator[tuple[str, str]]:
 def _of_chain(look: ChainLook) -> Iterator[tuple[str, str]]:
     """Yield keys and texts of what there is to say of a chain's joints."""
     for reason in [reason for reason in _FORMATS if reason in look.joints]:
-        words = listed(reason, look.joints[reason])
+        words = joints_found(reason, look.joints[reason])
         messages = _messages(look.held_back[reason])
         if reason == 'out_of_range':
             yield reason, f'out of range: {words}'

@@ -18,12 +18,12 @@ from types import ModuleType
 from typing import Any
 
 from icub_leg_fk.errors import InputFileError, MissingDependencyError, OutputFileError
+from icub_leg_fk.stream.cdr import JOINT_STATE
 from icub_leg_fk.tools.output_file import is_bag, whole_path
 from icub_leg_fk.tools.progress import Progress
 import yaml
 
 DEFAULT_TOPIC = '/joint_states'
-JOINT_STATE = 'sensor_msgs/msg/JointState'
 METADATA = 'metadata.yaml'
 STORAGES = {'.mcap': 'mcap', '.db3': 'sqlite3'}
 

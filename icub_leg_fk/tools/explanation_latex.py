@@ -9,7 +9,7 @@ from icub_leg_fk.tools.explanation_steps import (
     Entries,
     Equation,
     Heading,
-    Note,
+    Remark,
     Sentence,
     steps,
     Table,
@@ -56,7 +56,7 @@ def _lines(block: Block) -> list[str]:
             return [rf'\{command}*{{{_words(block.words)}}}']
         case Sentence():
             return ['', _words(block.words)]
-        case Note():
+        case Remark():
             return [r'\par\nopagebreak', _words(block.words)]
         case Table():
             return _table(block)

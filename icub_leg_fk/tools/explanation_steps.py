@@ -89,7 +89,7 @@ class Sentence:
 
 
 @dataclass(frozen=True)
-class Note:
+class Remark:
     """Words that belong to what they stand under."""
 
     words: str
@@ -128,7 +128,7 @@ class Entries:
         return list(zip(names, np.array(self.T)[:3].T.ravel().tolist(), strict=True))
 
 
-Block = Heading | Sentence | Note | Table | Equation | Entries
+Block = Heading | Sentence | Remark | Table | Equation | Entries
 
 
 def steps(e: Explanation) -> Iterator[Block]:
@@ -157,18 +157,18 @@ def _introduction(e: Explanation) -> Iterator[Block]:
         is_title=True,
     )
     if chain.source:
-        yield Note(f'Table from: {_free_text(chain.source)}')
+        yield Remark(f'Table from: {_free_text(chain.source)}')
     if e.q is None:
         symbols = [
             f'`q_{joint}` ({name})' for joint, name in enumerate(chain.joint_names)
         ]
-        yield Note(
+        yield Remark(
             f'Joint positions: symbols {", ".join(symbols)}. Lengths in mm, angles in rad.'
         )
         return
     joints = zip(chain.joint_names, chain.joints, e.q, strict=True)
     values = [f'{name} {position(link, value)}' for name, link, value in joints]
-    yield Note(f'Joint positions: {", ".join(values)}. Lengths in mm.')
+    yield Remark(f'Joint positions: {", ".join(values)}. Lengths in mm.')
 
 
 def _z_axes(e: Explanation) -> Iterator[Block]:
@@ -277,10 +277,10 @@ def _table(e: Explanation) -> Iterator[Block]:
         if row.link.robot_range and row.row.is_first
     ]
     if ranges:
-        yield Note(f'Ranges of robots, which count: {", ".join(ranges)}')
+        yield Remark(f'Ranges of robots, which count: {", ".join(ranges)}')
     for row in e.rows:
         if row.link.erratum:
-            yield Note(
+            yield Remark(
                 f'* `i = {row.index}` as printed: {_free_text(row.link.erratum)}'
             )
 
@@ -347,7 +347,7 @@ def _each_row(e: Explanation, row: ExplainedRow) -> Iterator[Block]:
     yield Sentence(
         f'`A_{i} = {_between(i, i + 1)} = {_factors(row, i)}`   {_joint(row.row)}'
     )
-    yield Note(
+    yield Remark(
         f'`theta_{i} = {_theta(e, row)}`   `d_{i} = {_d(e, row)}`   '
         f'`a_{i} = {plain(row.a)}`   `alpha_{i} = {_in_pi(row.link.alpha)}`'
     )

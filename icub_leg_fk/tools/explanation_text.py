@@ -10,7 +10,7 @@ from icub_leg_fk.tools.explanation_steps import (
     Entries,
     Equation,
     Heading,
-    Note,
+    Remark,
     Sentence,
     steps,
     Table,
@@ -27,7 +27,7 @@ def as_text(e: Explanation) -> str:
     for block in steps(e):
         lines = _lines(block)
         is_under_heading = isinstance(before, Heading) and isinstance(block, Table)
-        if isinstance(block, Note) or is_under_heading:
+        if isinstance(block, Remark) or is_under_heading:
             paragraphs[-1] += lines
         else:
             paragraphs.append(lines)
@@ -39,7 +39,7 @@ def _lines(block: Block) -> list[str]:
     match block:
         case Heading() | Sentence():
             return text.wrapped(_without_marks(block.words))
-        case Note():
+        case Remark():
             return text.indented(text.wrapped(_without_marks(block.words)))
         case Table():
             return _table(block)

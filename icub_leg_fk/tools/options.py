@@ -88,10 +88,9 @@ def refuse_no_chains(catalog: Catalog) -> None:
         )
 
 
-def load_chain(args: argparse.Namespace) -> tuple[Catalog, Chain]:
-    """Return the catalog, and the chain that the options name."""
-    catalog = load_catalog(args)
-    return catalog, catalog.chain(args.chain, args.version, args.foot_frame)
+def chosen_chain(args: argparse.Namespace) -> Chain:
+    """Return the chain that the options name."""
+    return load_catalog(args).chain(args.chain, args.version, args.foot_frame)
 
 
 def chains_of_one_root(args: argparse.Namespace) -> list[Chain]:

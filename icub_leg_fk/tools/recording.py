@@ -16,13 +16,13 @@ from typing import Any, NamedTuple
 from icub_leg_fk.errors import InputFileError, LegFKError
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
+from icub_leg_fk.stream.cdr import JOINT_STATE
 from icub_leg_fk.stream.configuration import DEFAULT_TIMEOUT
 from icub_leg_fk.stream.joint_input import JointInput, Look
 from icub_leg_fk.stream.notes import Note, notes_of
 from icub_leg_fk.tools.bags import (
     DEFAULT_TOPIC,
     import_rosbags,
-    JOINT_STATE,
     new_bag,
     open_bag,
 )
