@@ -131,7 +131,7 @@ class Health:
         period, self._last_look = now - self._last_look, now
         if look.messages:
             self._last_message = now
-        around = self._surroundings(now - self._last_message)
+        around = self._surroundings(silence=now - self._last_message)
         notes = notes_around(look, around, self._totals) + notes_of(look, self._topic)
         self._totals.add(look)
         self._log.show(notes, look)
@@ -139,8 +139,7 @@ class Health:
         array.header.stamp = self._node.get_clock().now().to_msg()
         for chain_look in look.chains.values():
             status = self._status(look, chain_look, notes)
-            values = self._values(chain_look, period, around)
-            status.values = [KeyValue(key=key, value=str(values[key])) for key in values]
+            status.values = self._values(chain_look, period, around)
             array.status.append(status)
         self._publisher.publish(array)
 
@@ -156,7 +155,10 @@ class Health:
         own_topic = node.resolve_topic_name(pose_topic(self._input.chains[0]))
         pose_publishers = node.get_publishers_info_by_topic(own_topic)
         return Surroundings(
-            self._topic, sorted(publishers), sorted(other_types), silence,
+            topic=self._topic,
+            publishers=sorted(publishers),
+            other_types=sorted(other_types),
+            silence=silence,
             has_time=node.get_clock().now().nanoseconds > 0,
             name=node.get_fully_qualified_name(),
             pose_publishers=[_full_name(info) for info in pose_publishers])
@@ -165,13 +167,16 @@ class Health:
                 ) -> DiagnosticStatus:
         """Return the status of a chain, without values."""
         chain = chain_look.chain
+        name = self._node.get_fully_qualified_name().lstrip('/')
         level, message = verdict(look, chain_look, notes)
         return DiagnosticStatus(
-            level=level, message=message, hardware_id=f'{chain.name}={chain.version}',
-            name=f'{self._node.get_fully_qualified_name().lstrip("/")}: {chain.name}')
+            level=level,
+            name=f'{name}: {chain.name}',
+            message=message,
+            hardware_id=f'{chain.name}={chain.version}')
 
     def _values(self, chain_look: ChainLook, period: float, around: Surroundings
-                ) -> dict[str, Any]:
+                ) -> list[KeyValue]:
         """Return the values of a chain's status."""
         chain = chain_look.chain
         stamps = self._input.held_stamps(chain).values()
@@ -186,14 +191,14 @@ class Health:
         }
         for reason, joints in sorted(chain_look.joints.items()):
             values[f'{reason} joints'] = listed(reason, joints)
-        return values
+        return [KeyValue(key=key, value=str(value)) for key, value in values.items()]
 
 
 class HealthLog:
     """Logs each note once, and again only after it has been well in between.
 
-    Rejected messages and those that give no pose are an exception: as long as there are any, they
-    are logged every five seconds. So is a step back in time, which is an event of its own.
+    Rejected messages and those that give no pose are logged every five seconds as long as there
+    are any. A step back in time is an event of its own, and logged each time.
 
     Args:
         logger: what logs, such as that of a node.
@@ -281,7 +286,7 @@ def _of_the_start(look: Look, around: Surroundings, before: Totals) -> Iterator[
 
 def _of_publishers(look: Look, around: Surroundings) -> Iterator[Note]:
     """Warn if two publishers seem to bring the joints of one chain."""
-    if look.messages == 0 or len(around.publishers) < 2:
+    if look.messages < 2 or len(around.publishers) < 2:
         return
     yield Note('publishers', '', INFO, f'{around.publisher_count()} on {around.topic}')
     for name, chain_look in look.chains.items():
@@ -296,8 +301,8 @@ def _of_clock_and_name(around: Surroundings) -> Iterator[Note]:
         yield Note('no_clock', '', WARNING, 'use_sim_time is set, but no time has come on /clock')
     if around.pose_publishers.count(around.name) > 1:
         yield Note('same_name', '', WARNING,
-                   f'another node is called {around.name} and publishes the same topics; '
-                   'another name for one of them: --ros-args -r __node:=NAME')
+                   f'another node is called {around.name} and publishes the same topics; give one '
+                   'of them another name: --ros-args -r __node:=NAME')
 
 
 def _full_name(info: Any) -> str:

@@ -1,21 +1,16 @@
 """Start and stop of the node: `ros2 run icub_leg_fk foot_pose_publisher`."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-import os
+from collections.abc import Sequence
 import re
 import signal
-import socket
 import sys
-import tempfile
-from types import FrameType
 from typing import Any
 
-_HIGHEST_DOMAIN = 232  # whose ports still are ports
+from icub_leg_fk.errors import LegFKError, MissingDependencyError
+from icub_leg_fk.node.arguments import check_assignments, read_arguments
+
 _SPIN_PERIOD = 0.25  # s; how long a signal may wait
-LOOPBACK_IS_DOWN = (
-    'the loopback interface is down, over which ROS nodes of one machine find each other; this '
-    'brings it up: sudo ip link set lo up')
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _HELP = """usage: foot_pose_publisher [--ros-args -p NAME:=VALUE ... --params-file FILE]
 
 Subscribes to joint_states (sensor_msgs/JointState) and publishes the poses of the iCub's feet
@@ -23,152 +18,84 @@ Subscribes to joint_states (sensor_msgs/JointState) and publishes the poses of t
 
 examples:
   foot_pose_publisher --ros-args -p version:=v2_5
-  foot_pose_publisher --ros-args -p chains:="[left_leg]" -p foot_frame:=sole
+  foot_pose_publisher --ros-args -p chains:="[left_leg, head_imu=v2]" -p foot_frame:=sole
   foot_pose_publisher --ros-args --params-file foot_pose_publisher.yaml
 
-parameters: chains, version, <chain>.version, kinematics_file, foot_frame, frame_prefix,
-joint_timeout, stamp_source, publish_tf, publish_twist, publish_markers.
-The package's docs/node.md explains them, and of a running node:
+parameters: chains, version, kinematics_file, foot_frame, frame_prefix, joint_timeout,
+stamp_source, publish_tf, publish_twist, publish_markers. While the node runs, this explains each:
   ros2 param describe /foot_pose_publisher NAME
 """
 
 
 def main() -> int:
-    """Run the node until SIGINT or SIGTERM; return 0, or 1 after a line on what was wrong."""
-    stop = _StopSignals()
-    try:
-        return _run(stop, sys.argv)
-    finally:
-        stop.ignore()
+    """Run the node until SIGINT or SIGTERM; return 0, or 1 after a line on what is wrong.
 
-
-class _StopSignals:
-    """Remembers that SIGINT or SIGTERM has come; before the node stands, they end the process.
-
-    rclpy's own handlers raise out of whatever the interpreter is doing, and a second signal
+    rclpy's own signal handlers raise out of whatever the interpreter is doing, and a second signal
     during shutdown ends in a traceback; `ros2 launch` sends SIGINT twice.
     """
-
-    def __init__(self) -> None:
-        self.requested = False
-        self._starting = True
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, self._on_signal)
-
-    def _on_signal(self, number: int, frame: FrameType | None) -> None:
-        if self._starting:
-            os._exit(0)
-        self.requested = True
-
-    def started(self) -> None:
-        """From now on there is something to take down in order."""
-        self._starting = False
-
-    def ignore(self) -> None:
-        """From now on the process is on its way out by itself."""
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, signal.SIG_IGN)
-
-
-def _run(stop: _StopSignals, argv: list[str]) -> int:
-    if {'-h', '--help'}.intersection(argv[1:]):
-        print(_HELP, end='')
-        return 0
+    received: list[int] = []  # an Event would block where one signal comes upon the other
+    for number in _SIGNALS:
+        signal.signal(number, lambda number, _: received.append(number))
     try:
-        import rclpy
-        from rclpy.signals import SignalHandlerOptions
-        from rclpy.task import Future
-        from rclpy.utilities import remove_ros_args
-    except ImportError as error:
-        return _refuse(f'rclpy cannot be imported ({error}); source ROS 2, or install '
-                       'icub_leg_fk[ros]')
-    from icub_leg_fk.errors import LegFKError
-    from icub_leg_fk.node.foot_pose_publisher import FootPosePublisher, START_ERRORS
-    if fault := _bare_assignment(argv[1:]) or unusable_domain():
-        return _refuse(fault)
-    try:
-        with _stderr_unless_it_raises():
-            rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
-        if others := remove_ros_args(argv)[1:]:
-            return _refuse(f'unknown argument {others[0]!r}; parameters go behind --ros-args')
-    except RuntimeError as error:  # rclpy's errors for arguments it cannot parse
-        if type(error).__name__ == 'UnknownROSArgsError':
-            return _refuse(f'unknown argument {str(error).strip("[]")} behind --ros-args')
-        return _refuse(str(error).removesuffix('. Error: error not set'))
-    stop.started()
-    try:
-        executor = _executor()
-        try:
-            node = FootPosePublisher()
-        except (LegFKError, *START_ERRORS) as error:
-            return _refuse(str(error))
-        if not loopback_is_up():
-            node.get_logger().warning(LOOPBACK_IS_DOWN)
-        executor.add_node(node)
-        while rclpy.ok() and not stop.requested:
-            # Unlike spin_once, this takes message after message without coming back in between.
-            executor.spin_until_future_complete(Future(), timeout_sec=_SPIN_PERIOD)
+        _run(sys.argv, received)
+    except LegFKError as error:
+        print(f'foot_pose_publisher: error: {error}', file=sys.stderr)
+        return 1
     finally:
-        rclpy.try_shutdown()
+        for number in _SIGNALS:
+            signal.signal(number, signal.SIG_IGN)
     return 0
 
 
-def _bare_assignment(arguments: Sequence[str]) -> str | None:
-    """Say how to write an assignment outside of --ros-args, which rcl takes for a remapping."""
-    from icub_leg_fk.node.parameters import is_parameter_name
-    behind_ros_args = False
-    for argument in arguments:
-        if argument in ('--ros-args', '--'):
-            behind_ros_args = argument == '--ros-args'
-        elif not behind_ros_args and ':=' in argument:
-            name, _, value = argument.partition(':=')
-            parameter = name.removeprefix('_')
-            meant = (f'-p {parameter}' if is_parameter_name(parameter) else f'-r {name}')
-            return f'unknown argument {argument!r}; did you mean --ros-args {meant}:={value}?'
-    return None
-
-
-@contextmanager
-def _stderr_unless_it_raises() -> Iterator[None]:
-    """Let what C writes to stderr pass, but for the report of an error that is raised as well."""
-    if sys.stderr is None:  # it was closed before the start
-        yield
+def _run(argv: Sequence[str], received: Sequence[int]) -> None:
+    """Make the node and let it work until a signal has been received."""
+    if '-h' in argv or '--help' in argv:
+        print(_HELP, end='')
         return
-    sys.stderr.flush()
-    stderr = os.dup(2)
-    with tempfile.TemporaryFile() as written:
-        os.dup2(written.fileno(), 2)
-        try:
-            yield
-        except BaseException:
-            written.truncate(0)
-            raise
-        finally:
-            os.dup2(stderr, 2)
-            os.close(stderr)
-            written.seek(0)
-            while block := written.read(65536):
-                os.write(2, block)
+    rclpy = _rclpy()
+    try:
+        node = _node(rclpy, argv)
+        executor = _executor()
+        executor.add_node(node)
+        while rclpy.ok() and not received:
+            # Unlike spin_once, this takes message after message without coming back in between.
+            executor.spin_until_future_complete(rclpy.task.Future(), timeout_sec=_SPIN_PERIOD)
+    finally:
+        rclpy.try_shutdown()
 
 
-def _refuse(reason: str) -> int:
-    line = re.sub(r',? at \S+:\d+', '', ' '.join(reason.split()))  # where in rcl's sources
-    print(f'foot_pose_publisher: error: {line}', file=sys.stderr)
-    return 1
+def _rclpy() -> Any:
+    try:
+        import rclpy
+        return rclpy
+    except ImportError as error:
+        raise MissingDependencyError(
+            'rclpy', 'the node', f"source ROS 2, or pip install 'icub_leg_fk[ros]' ({error})"
+        ) from error
 
 
-def loopback_is_up() -> bool:
-    """Return whether processes of this machine can reach each other."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        return probe.connect_ex(('127.0.0.1', 9)) == 0  # sends nothing
+def _node(rclpy: Any, argv: Sequence[str]) -> Any:
+    """Return the node as the command line wants it."""
+    from icub_leg_fk.node.foot_pose_publisher import FootPosePublisher, START_ERRORS
+    from icub_leg_fk.node.parameters import PARAMETER_NAMES
+    check_assignments(read_arguments(argv), PARAMETER_NAMES)
+    no_handlers = rclpy.signals.SignalHandlerOptions.NO
+    try:
+        rclpy.init(args=argv, signal_handler_options=no_handlers)
+        others = rclpy.utilities.remove_ros_args(argv)[1:]
+        if others:
+            raise LegFKError(f'unknown argument {others[0]!r}; parameters go after --ros-args')
+        return FootPosePublisher()
+    except START_ERRORS as error:
+        raise LegFKError(_said_by_rclpy(error)) from error
 
 
-def unusable_domain() -> str:
-    """Say what is wrong with ROS_DOMAIN_ID; for one too high Fast DDS ends the process."""
-    domain = os.environ.get('ROS_DOMAIN_ID', '')
-    if domain.isdecimal() and int(domain) > _HIGHEST_DOMAIN:
-        return f'ROS_DOMAIN_ID: found {domain}, allowed: 0 to {_HIGHEST_DOMAIN}'
-    return ''
+def _said_by_rclpy(error: Exception) -> str:
+    """Return a line of what rclpy raises, without the places in its sources."""
+    line = re.sub(r',? at /\S+:\d+', '', ' '.join(str(error).split()))
+    if type(error).__name__ == 'UnknownROSArgsError':
+        return f'unknown argument {line.strip("[]")} after --ros-args'
+    return line
 
 
 def _executor() -> Any:

@@ -25,7 +25,8 @@ from visualization_msgs.msg import MarkerArray
 
 _DEPTH = 10
 _TF_DEPTH = 100  # as tf2_ros.TransformBroadcaster has it
-_TF, _SKELETON = '/tf', '~/skeleton'
+_TF = '/tf'
+_SKELETON = '~/skeleton'
 
 
 class Outputs:
@@ -39,24 +40,23 @@ class Outputs:
         self._node = node
         self._publishers: dict[str, Publisher] = {}
         self._events_supported = True
-        self._stamp_now = False
 
     def configure(self, configuration: Configuration) -> None:
         """Create the publishers that are needed and destroy those that are not."""
         self._configuration = configuration
-        self._stamp_now = configuration.stamp_now
         if _SKELETON in self._publishers:
             self._publishers[_SKELETON].publish(no_skeletons())
         topics = _topics(configuration)
         for topic in self._publishers.keys() - topics.keys():
             self._node.destroy_publisher(self._publishers.pop(topic))
-        for topic in topics.keys() - self._publishers.keys():
-            self._publishers[topic] = self._create(topic, topics[topic])
+        for topic, message_type in topics.items():
+            if topic not in self._publishers:
+                self._publishers[topic] = self._create(topic, message_type)
         self._connect()
 
     def publish(self, vectors: Sequence[Ready]) -> None:
         """Publish what one message has made ready."""
-        if self._stamp_now:
+        if self._configuration.stamp_now:
             sec, nanosec = divmod(self._node.get_clock().now().nanoseconds, 1_000_000_000)
             vectors = [replace(vector, sec=sec, nanosec=nanosec) for vector in vectors]
         self._stream.send(vectors)
@@ -64,39 +64,44 @@ class Outputs:
             self._publish_skeletons(vectors)
 
     def _publish_skeletons(self, vectors: Sequence[Ready]) -> None:
+        prefix = self._configuration.frame_prefix
         for vector in vectors:
             stamp = Time(sec=vector.sec, nanosec=vector.nanosec)
-            self._publishers[_SKELETON].publish(skeleton_markers(
-                vector.chain, vector.positions, stamp, self._configuration.frame_prefix))
+            markers = skeleton_markers(vector.chain, vector.positions, stamp, prefix)
+            self._publishers[_SKELETON].publish(markers)
 
     def _connect(self) -> None:
         """Decide what each chain's joint vectors become, by who subscribes."""
         configuration = self._configuration
         senders = {}
         for chain in configuration.chains:
-            pose, twist = self._sender(pose_topic(chain)), self._sender(_twist_topic(chain))
+            pose = self._sender(pose_topic(chain))
+            twist = self._sender(_twist_topic(chain))
             senders[chain.name] = Senders(pose, twist)
-        self._stream = PoseStream(configuration.chains, configuration.frame_prefix, senders,
-                                  self._sender(_TF))
+        self._stream = PoseStream(
+            configuration.chains, configuration.frame_prefix, senders, self._sender(_TF))
         self._wants_skeletons = self._is_wanted(_SKELETON)
 
     def _create(self, topic: str, message_type: Any) -> Publisher:
-        options: dict[str, Any] = {'qos_overriding_options': OVERRIDABLE}
         qos = QoSProfile(depth=_DEPTH)
+        options: dict[str, Any] = {'qos_overriding_options': OVERRIDABLE}
         if topic == _TF:
-            options, qos = {}, QoSProfile(depth=_TF_DEPTH)
+            qos = QoSProfile(depth=_TF_DEPTH)
+            options = {}
         if self._events_supported:
-            events = PublisherEventCallbacks(matched=lambda info: self._connect())
-            try:
-                return self._node.create_publisher(message_type, topic, qos,
-                                                   event_callbacks=events, **options)
-            except UnsupportedEventTypeError:
-                self._events_supported = False
-        return self._node.create_publisher(message_type, topic, qos, **options)
+            options['event_callbacks'] = PublisherEventCallbacks(
+                matched=lambda info: self._connect())
+        try:
+            return self._node.create_publisher(message_type, topic, qos, **options)
+        except UnsupportedEventTypeError:
+            self._events_supported = False
+            return self._create(topic, message_type)
 
     def _sender(self, topic: str) -> Send | None:
         """Return what sends serialized messages on a topic; None if nobody listens."""
-        return raw_publish(self._publishers[topic]) if self._is_wanted(topic) else None
+        if not self._is_wanted(topic):
+            return None
+        return raw_publish(self._publishers[topic])
 
     def _is_wanted(self, topic: str) -> bool:
         """Return whether messages on a topic are for anybody."""

@@ -1,79 +1,90 @@
 """The node's parameters: declared with type, description and bounds; changed all or nothing."""
 
-from collections.abc import Callable, Mapping, Sequence
+from __future__ import annotations
+
+from collections.abc import Callable, Container, Mapping, Sequence
 from importlib.util import find_spec
+from pathlib import Path
+import sys
 from typing import Any, NamedTuple
 
-from icub_leg_fk.errors import closest, LegFKError, ParameterError
+from icub_leg_fk.errors import closest, LegFKError, ParameterError, UnknownNameError
 from icub_leg_fk.kinematics import Catalog
-from icub_leg_fk.node.qos_overrides import check_qos_override, PREFIX
+from icub_leg_fk.node.arguments import files_for_others, names_given, read_arguments
+from icub_leg_fk.node.qos_overrides import PREFIX, QoSOverrides
+from icub_leg_fk.node.rclpy_private import parameter_overrides
 from icub_leg_fk.stream.configuration import (
     Configuration,
+    DEFAULT_FRAME,
     DEFAULT_TIMEOUT,
+    LEGS,
     LONGEST_TIMEOUT,
     STAMP_SOURCES,
 )
-from rcl_interfaces.msg import (
-    FloatingPointRange,
-    ParameterDescriptor,
-    SetParametersResult,
-)
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
 from rclpy.exceptions import ParameterException, ParameterUninitializedException
 from rclpy.node import Node
-from rclpy.parameter import Parameter
+from rclpy.parameter import Parameter as RclpyParameter
 
 
-class _Parameter(NamedTuple):
+class Parameter(NamedTuple):
+    """A parameter of the node.
+
+    Attributes:
+        name: its name.
+        default: its value where none is given; it has the type of all values.
+        description: what it means, in a sentence.
+        allowed: which values it may have.
+        largest: greatest value of a number that is at least 0; None if it is no number.
+        is_live: whether it can be changed while the node runs.
+    """
+
     name: str
     default: Any
     description: str
-    constraints: str = ''
+    allowed: str
     largest: float | None = None
-    read_only: bool = False
+    is_live: bool = True
 
     def descriptor(self) -> ParameterDescriptor:
         """Return what `ros2 param describe` shows."""
-        descriptor = ParameterDescriptor(description=self.description,
-                                         additional_constraints=self.constraints,
-                                         read_only=self.read_only)
+        descriptor = ParameterDescriptor(description=self.description, read_only=not self.is_live,
+                                         additional_constraints=self.allowed)
         if self.largest is not None:
             descriptor.floating_point_range = [
                 FloatingPointRange(from_value=0.0, to_value=self.largest, step=0.0)]
         return descriptor
 
 
-_PARAMETERS = (
-    _Parameter('chains', ['left_leg', 'right_leg'], 'Chains whose tip poses are published.',
-               'a list of chains of the kinematics file, each once, such as [left_leg, head_imu=v2]',
-               read_only=True),
-    _Parameter('version', '', 'Version of every chain that is named without one; empty: its default.',
-               'a version of the kinematics file, such as v2_5 (leg_fk list shows them)'),
-    _Parameter('kinematics_file', '', 'Kinematics file to read; empty is the shipped one.',
-               'path of a YAML file', read_only=True),
-    _Parameter('foot_frame', 'dh', "Axes of the tip: the table's last frame, or the sole.",
-               'a tip frame of the kinematics file, such as dh or sole'),
-    _Parameter('frame_prefix', '', 'Put before every frame id.',
-               'printable, no space, no leading slash'),
-    _Parameter('joint_timeout', DEFAULT_TIMEOUT, 'Age of a joint beside the newest of its chain '
-               'above which the chain is held back [s]; 0 turns this off.', '', LONGEST_TIMEOUT),
-    _Parameter('stamp_source', 'message', "Stamp of the poses: the message's, or the node's "
-               "time; a zero message stamp always becomes the node's time.",
-               ' or '.join(STAMP_SOURCES)),
-    _Parameter('publish_tf', False, 'Also broadcast the poses on /tf (needs tf2_msgs).'),
-    _Parameter('publish_twist', False, 'Also publish the velocity of the tips.'),
-    _Parameter('publish_markers', False, 'Also publish the skeletons for RViz and Foxglove.'),
+_YES_OR_NO = 'true or false'
+PARAMETERS = (
+    Parameter('chains', list(LEGS), 'Chains whose tip poses are published.',
+              'a list of chains, each once and with its version if need be, such as '
+              '[left_leg, head_imu=v2]', is_live=False),
+    Parameter('version', '', 'Version of every chain that is named without one; empty: the '
+              "file's default.", 'a version of the kinematics file, such as v2_5; leg_fk list '
+              'shows them'),
+    Parameter('kinematics_file', '', 'Kinematics file to read; empty: the shipped one.',
+              'path of a file; ~ is your home', is_live=False),
+    Parameter('foot_frame', DEFAULT_FRAME, "Axes of the tip: the table's last frame, or the sole.",
+              'a tip frame of the kinematics file, such as dh or sole'),
+    Parameter('frame_prefix', '', 'Put before every frame id, such as icub1/.',
+              'printable, no space, no leading slash'),
+    Parameter('joint_timeout', DEFAULT_TIMEOUT, 'How far a joint may lag the newest of its chain '
+              'before the chain is held back [s]; 0.0 turns this off.',
+              f'a number with a decimal point from 0.0 to {LONGEST_TIMEOUT:.0f}.0',
+              LONGEST_TIMEOUT),
+    Parameter('stamp_source', STAMP_SOURCES[0], "Stamp of the poses: the message's, or the node's "
+              "time; a zero message stamp always becomes the node's time.",
+              ' or '.join(STAMP_SOURCES)),
+    Parameter('publish_tf', False, 'Also broadcast the poses on /tf (needs tf2_msgs).',
+              _YES_OR_NO),
+    Parameter('publish_twist', False, 'Also publish the velocity of the tips.', _YES_OR_NO),
+    Parameter('publish_markers', False, 'Also publish the skeletons for RViz and Foxglove.',
+              _YES_OR_NO),
 )
 _RCLPYS_OWN = ('use_sim_time', 'start_type_description_service')
-_COMMON_ELSEWHERE = ('frame_id', 'root_frame', 'base_frame', 'tf_prefix', 'publish_rate',
-                     'robot_description', 'joints')
-"""Names that other nodes have: in a file for all nodes they are theirs, not ours misspelt."""
-
-
-def is_parameter_name(name: str) -> bool:
-    """Return whether this is the name of a parameter of the node, or nearly so."""
-    names = [parameter.name for parameter in _PARAMETERS]
-    return (name in (*names, *_RCLPYS_OWN) or name.startswith(PREFIX)
-            or closest(name, names) is not None)
+PARAMETER_NAMES = (*(parameter.name for parameter in PARAMETERS), *_RCLPYS_OWN)
 
 
 class NodeParameters:
@@ -87,101 +98,122 @@ class NodeParameters:
         configuration: the present configuration.
 
     Raises:
-        ParameterError: a parameter given at start is unknown or cannot be used.
+        ParameterError: a parameter given at start cannot be used.
+        UnknownNameError: the command line gives a parameter that the node does not have.
         CatalogError: the kinematics file cannot be used.
     """
 
     def __init__(self, node: Node, apply: Callable[[Configuration], None]) -> None:
         self._node = node
         self._apply = apply
-        self._declaring = True
-        for parameter in _PARAMETERS:
+        self._overrides = parameter_overrides(node)
+        for parameter in PARAMETERS:
             self._declare(parameter)
-        self._catalog = Catalog.load(node.get_parameter('kinematics_file').value or None)
-        self._check_overrides()
-        self.configuration = _configuration(self._catalog, self._values())
-        self._declaring = False
+        self._catalog = load_catalog(node.get_parameter('kinematics_file').value)
+        self._check_unknown()
+        self.configuration = configuration_of(self._catalog, self._values())
         self._candidate: Configuration | None = None
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._adopt)
 
-    def _declare(self, parameter: _Parameter) -> None:
+    def _declare(self, parameter: Parameter) -> None:
+        name = parameter.name
         try:
-            self._node.declare_parameter(parameter.name, parameter.default,
-                                         parameter.descriptor())
+            self._node.declare_parameter(name, parameter.default, parameter.descriptor())
         except ParameterException as error:
-            overrides = self._node._parameter_overrides
-            raise ParameterError(
-                parameter.name, f'found {overrides[parameter.name].value!r}, allowed: '
-                f'{parameter.constraints or _kind(parameter)}') from error
+            found = self._overrides[name].value
+            raise ParameterError(name, f'found {found!r}, allowed: {parameter.allowed}') from error
 
-    def _check_overrides(self) -> None:
-        """Refuse overrides that rclpy would pass over in silence: misspelt ones and bad QoS.
+    def _check_unknown(self) -> None:
+        """Look at what rclpy passes over: parameters that the node does not have, and bad QoS.
 
-        A file for all nodes holds other nodes' parameters, too; that they are passed over is said.
+        Those of the command line are refused; those of files, which may be for all nodes, are
+        named once.
         """
-        known = [*(parameter.name for parameter in _PARAMETERS), *_RCLPYS_OWN]
-        resolve = self._node.resolve_topic_name
-        roles = {resolve('joint_states'): 'subscription'}
-        roles |= {resolve(f'~/{entry.tip}/{kind}'): 'publisher'
-                  for entry in self._catalog.chains.values() for kind in ('pose', 'twist')}
-        roles[resolve('~/skeleton')] = 'publisher'
-        foreign = []
-        for name, override in self._node._parameter_overrides.items():
+        node = self._node.get_fully_qualified_name()
+        arguments = read_arguments(sys.argv)
+        ignored = self._unknown(names_given(arguments, node))
+        log = self._node.get_logger()
+        if ignored:
+            log.warning(f'ignored parameters that this node does not have: {", ".join(ignored)}')
+        for line in files_for_others(arguments, node):
+            log.warning(line)
+
+    def _unknown(self, given: Container[str]) -> list[str]:
+        """Return the names that the node does not have, but for those given: they are refused."""
+        qos = QoSOverrides(self._roles())
+        unknown = []
+        for name, override in self._overrides.items():
             if name.startswith(PREFIX):
-                check_qos_override(name, override.value, roles)
-            elif name not in known:
-                if name not in _COMMON_ELSEWHERE and (guess := closest(name, known)):
-                    raise ParameterError(
-                        f'unknown parameter {name!r}; did you mean {guess!r}?')
-                foreign.append(name)
-        if foreign:
-            self._node.get_logger().warning(
-                f'passed over parameters that are not of this node: {", ".join(foreign)}')
+                if qos.has(name):
+                    qos.check(name, override.value)
+                    continue
+                error = qos.unknown(name)
+            elif name in PARAMETER_NAMES:
+                continue
+            else:
+                error = UnknownNameError('parameter', name, PARAMETER_NAMES)
+            if name in given:
+                raise error
+            guess = closest(error.name, error.choices)
+            unknown.append(f'{name} (did you mean {guess}?)' if guess else name)
+        return unknown
+
+    def _roles(self) -> dict[str, str]:
+        """Return `publisher` or `subscription` by full name of each topic whose QoS can change."""
+        resolve = self._node.resolve_topic_name
+        roles = {resolve('joint_states'): 'subscription', resolve('~/skeleton'): 'publisher'}
+        for entry in self._catalog.chains.values():
+            for kind in ('pose', 'twist'):
+                roles[resolve(f'~/{entry.tip}/{kind}')] = 'publisher'
+        return roles
 
     def _values(self) -> dict[str, Any]:
-        return {parameter.name: self._value(parameter.name) for parameter in _PARAMETERS}
+        return {parameter.name: self._value(parameter.name) for parameter in PARAMETERS}
 
     def _value(self, name: str) -> Any:
         try:
             return self._node.get_parameter(name).value
         except ParameterUninitializedException:  # rclpy takes an empty list for no value
-            return None
+            return ()
 
-    def _check(self, changes: Sequence[Parameter]) -> SetParametersResult:
+    def _check(self, changes: Sequence[RclpyParameter]) -> SetParametersResult:
         """Refuse a set of changes that gives no valid configuration; changes nothing."""
         self._candidate = None
-        if self._declaring:
-            return SetParametersResult(successful=True)
         values = self._values()
-        ours = [change for change in changes if change.name in values]
-        if not ours:
-            return SetParametersResult(successful=True)
-        values |= {change.name: change.value for change in ours}
-        try:
-            self._candidate = _configuration(self._catalog, values)
-        except LegFKError as error:
-            return SetParametersResult(successful=False, reason=str(error))
+        ours = {change.name: change.value for change in changes if change.name in values}
+        if ours:
+            try:
+                self._candidate = configuration_of(self._catalog, values | ours)
+            except LegFKError as error:
+                return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
-    def _adopt(self, changes: Sequence[Parameter]) -> None:
-        """Take over what `_check` has found valid."""
-        if self._candidate is None:
-            return
-        self.configuration, self._candidate = self._candidate, None
-        self._apply(self.configuration)
+    def _adopt(self, changes: Sequence[RclpyParameter]) -> None:
+        """Work with what `_check` has found valid."""
+        if self._candidate is not None:
+            self.configuration = self._candidate
+            self._candidate = None
+            self._apply(self.configuration)
 
 
-def _configuration(catalog: Catalog, values: Mapping[str, Any]) -> Configuration:
-    """Return the configuration of parameter values by name."""
+def load_catalog(kinematics_file: str) -> Catalog:
+    """Return the catalog that a value of the parameter names.
+
+    Raises:
+        CatalogError: the file cannot be used.
+    """
+    return Catalog.load(Path(kinematics_file).expanduser() if kinematics_file else None)
+
+
+def configuration_of(catalog: Catalog, values: Mapping[str, Any]) -> Configuration:
+    """Return the configuration of parameter values by name.
+
+    Raises:
+        ParameterError: a value cannot be used.
+    """
+    if values['publish_tf'] and find_spec('tf2_msgs') is None:
+        raise ParameterError('publish_tf', 'found true, but tf2_msgs, which ROS 2 has, is not '
+                             'installed; allowed: false')
     others = {name: value for name, value in values.items() if name != 'kinematics_file'}
-    if others['publish_tf'] and find_spec('tf2_msgs') is None:
-        raise ParameterError('publish_tf', 'found true without the Python module tf2_msgs; '
-                             'allowed: false, or install tf2_msgs, which ROS 2 has')
     return Configuration.checked(catalog, **others)
-
-
-def _kind(parameter: _Parameter) -> str:
-    if parameter.largest is not None:
-        return f'a number with a decimal point from 0.0 to {parameter.largest}'
-    return 'true or false'

@@ -18,23 +18,26 @@ What happens is counted, and noted with the joints it concerns, until somebody t
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import math
 
 from icub_leg_fk.errors import MalformedMessageError
-from icub_leg_fk.kinematics import Chain
+from icub_leg_fk.kinematics import Chain, DHLink
 from icub_leg_fk.stream.joint_state_reader import Form, JointStateReader, Pick
 
 LARGEST_VALUE = 1e150  # of a position or velocity; beyond it sums and products overflow
 REJECTIONS = ('malformed', 'empty_position', 'position_length', 'duplicate_name')
 TIME_JUMP = 'time_jump'
+HOLD_BACK = ('missing_joint', 'stale_joint', 'non_finite', 'no_velocity')
+"""Why a chain gives no pose or no twist."""
 
 _SECOND = 1_000_000_000  # ns
 _LAST_SECOND = (1 << 31) - 1  # that a stamp can hold
 _BEFORE_ALL_TIME = -(1 << 63)  # ns
 _LARGEST_USABLE = math.nextafter(LARGEST_VALUE, 0.0)
+_TURN = 2 * math.pi
 _UNKNOWN = math.nan
 _MOST_NAMES = 1000  # that a look holds; strangers may send any number
 _MOST_FRAME_IDS = 8
@@ -87,15 +90,10 @@ class ChainLook:
     joints: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def note(self, reason: str, joints: Mapping[str, float]) -> None:
-        """Note the joints that a reason concerns, if there are any."""
-        if joints:
-            self.joints.setdefault(reason, {}).update(joints)
-
-    def hold_back(self, reason: str, joints: Mapping[str, float]) -> None:
-        """Note and count a message that gives no pose, if any joint is a reason for that."""
-        if joints:
+        """Note the joints that a reason concerns, and count a message that gives less for it."""
+        self.joints.setdefault(reason, {}).update(joints)
+        if reason in HOLD_BACK:
             self.held_back[reason] += 1
-            self.note(reason, joints)
 
 
 @dataclass
@@ -143,9 +141,6 @@ class _Brought:
     positions: tuple[float, ...]
     velocities: tuple[float, ...] | None
 
-    def position(self, joint: str) -> float:
-        return self.positions[self.places[joint]]
-
     def velocity(self, joint: str) -> float:
         return _UNKNOWN if self.velocities is None else self.velocities[self.places[joint]]
 
@@ -159,13 +154,10 @@ class JointInput:
         now: returns the present time [ns], which stamps messages with a zero stamp.
 
     Attributes:
-        messages: messages received.
         chains: the chains; one joint may belong to several.
     """
 
     def __init__(self, now: Callable[[], int]) -> None:
-        self.messages = 0
-        self._messages_before = 0  # the last look
         self._now = now
         self._look = Look()
         self._held: dict[str, _Brought] = {}
@@ -198,7 +190,7 @@ class JointInput:
 
     def feed(self, data: bytes) -> list[Ready]:
         """Take one serialized JointState in and return the joint vectors it makes ready."""
-        self.messages += 1
+        self._look.messages += 1
         form = self._form_of(data)
         if form is None or not form.chains:
             return []
@@ -212,8 +204,10 @@ class JointInput:
         brought = self._hold(form, sec * _SECOND + nanosec, data)
         ready = []
         for state, pick in form.chains:
-            q = self._positions_held(state) if pick is None else pick(brought.positions)
-            if q is None or not state.can_use(q):
+            q = pick(brought.positions) if pick else None
+            if q is None or not state.is_in_range(q):
+                q = self._examine(state)
+            if q is None:
                 state.look.silent += 1
                 continue
             state.look.ready += 1
@@ -224,8 +218,6 @@ class JointInput:
     def take_look(self) -> Look:
         """Return what has happened since this was last called."""
         look, self._look = self._look, Look()
-        look.messages = self.messages - self._messages_before
-        self._messages_before = self.messages
         for state in self._states:
             look.chains[state.chain.name] = state.look
             state.look = ChainLook(state.chain)
@@ -277,29 +269,32 @@ class JointInput:
         held = [self._held[joint].stamp for joint in form.places if joint in self._held]
         return max(held, default=stamp) > stamp
 
-    def _positions_held(self, state: _ChainState) -> tuple[float, ...] | None:
-        """Return the positions held of a chain's joints; None if any is missing, stale or bad."""
-        held, timeout = self._held, self._timeout
+    def _examine(self, state: _ChainState) -> tuple[float, ...] | None:
+        """Return the positions held of a chain's joints; None if any is missing, stale or bad.
+
+        What is the matter with any of them is noted.
+        """
+        held = self._held
         newest = max([held[joint].stamp for joint in state.joints if joint in held])
-        missing, stale, bad = {}, {}, {}
+        found: defaultdict[str, dict[str, float]] = defaultdict(dict)
         positions = []
-        for joint in state.joints:
+        for joint, (lower, upper), link in zip(state.joints, state.ranges, state.chain.joints):
             if joint not in held:
-                missing[joint] = _UNKNOWN
+                found['missing_joint'][joint] = _UNKNOWN
                 continue
             brought = held[joint]
-            position = brought.position(joint)
+            position = brought.positions[brought.places[joint]]
             positions.append(position)
-            if timeout and newest - brought.stamp > timeout:
-                stale[joint] = (newest - brought.stamp) / _SECOND
-            elif not _is_usable(position):
-                bad[joint] = position
-        if not missing and not stale and not bad:
-            return tuple(positions)
-        state.look.hold_back('missing_joint', missing)
-        state.look.hold_back('stale_joint', stale)
-        state.look.hold_back('non_finite', bad)
-        return None
+            lag = newest - brought.stamp
+            if lag > self._timeout > 0:
+                found['stale_joint'][joint] = lag / _SECOND
+            elif not lower <= position <= upper:
+                for reason in _faults(position, lower, upper, link):
+                    found[reason][joint] = position
+        reasons = [reason for reason in HOLD_BACK if reason in found]
+        for reason in reasons or found:
+            state.look.note(reason, found[reason])
+        return None if reasons else tuple(positions)
 
     def _velocities(self, state: _ChainState, brought: _Brought, pick: Pick | None
                     ) -> tuple[float, ...] | None:
@@ -310,8 +305,9 @@ class JointInput:
             qdot = pick(brought.velocities)
         if _are_usable(qdot):
             return qdot
-        bad = {joint: value for joint, value in zip(state.joints, qdot) if not _is_usable(value)}
-        state.look.hold_back('no_velocity', bad)
+        bad = {joint: value for joint, value in zip(state.joints, qdot)
+               if not abs(value) < LARGEST_VALUE}
+        state.look.note('no_velocity', bad)
         return None
 
 
@@ -324,37 +320,24 @@ class _ChainState:
         self.look = ChainLook(chain)
         lower = [max(value, -_LARGEST_USABLE) for value in chain.lower.tolist()]
         upper = [min(value, _LARGEST_USABLE) for value in chain.upper.tolist()]
-        self._ranges = list(zip(lower, upper))
+        self.ranges = list(zip(lower, upper))
 
-    def can_use(self, q: Sequence[float]) -> bool:
-        """Return whether all positions are finite; note those that are not, or out of range."""
-        for value, (lower, upper) in zip(q, self._ranges):
+    def is_in_range(self, q: Sequence[float]) -> bool:
+        """Return whether all positions are within their ranges, and so finite."""
+        for value, (lower, upper) in zip(q, self.ranges):
             if not lower <= value <= upper:
-                return self._note_positions(q)
-        return True
-
-    def _note_positions(self, q: Sequence[float]) -> bool:
-        bad, outside, turns = {}, {}, {}
-        ranges = zip(self.joints, q, self._ranges, self.chain.joints)
-        for joint, value, (lower, upper), link in ranges:
-            beyond = max(lower - value, value - upper)
-            if not _is_usable(value):
-                bad[joint] = value
-            elif beyond > 0:
-                outside[joint] = value
-                if min(abs(value), beyond) > 2 * math.pi and not link.is_prismatic:
-                    turns[joint] = value
-        self.look.hold_back('non_finite', bad)
-        if bad:
-            return False
-        self.look.note('out_of_range', outside)
-        self.look.note('looks_like_degrees', turns)
+                return False
         return True
 
 
-def _is_usable(value: float) -> bool:
-    """Return whether a value is finite, with room to compute with it."""
-    return -LARGEST_VALUE < value < LARGEST_VALUE
+def _faults(position: float, lower: float, upper: float, link: DHLink) -> tuple[str, ...]:
+    """Return what is the matter with a position that is out of range."""
+    if not abs(position) < LARGEST_VALUE:
+        return 'non_finite',
+    beyond = max(lower - position, position - upper)
+    if beyond > _TURN and abs(position) > _TURN and not link.is_prismatic:
+        return 'looks_like_degrees', 'out_of_range'
+    return 'out_of_range',
 
 
 def _are_usable(values: Sequence[float]) -> bool:

@@ -1,38 +1,50 @@
 """`leg_fk explain` in decimals, and what holds of every form of it."""
 
-import json
+from dataclasses import replace
 import re
 
+from hypothesis import given, settings
+from icub_leg_fk.__main__ import main
+from icub_leg_fk.kinematics.chain_text import joint_range
+from icub_leg_fk.kinematics.link import standard_rows
+from icub_leg_fk.tools.explanation import explain as explained
+from icub_leg_fk.tools.explanation_latex import as_latex
+from icub_leg_fk.tools.explanation_text import as_text
 import numpy as np
 import pytest
+from support.any_chain import chains_and_positions
 from support.explain_cases import (
+    ARM,
+    Case,
     every_chain,
-    EXAMPLES,
     explain,
+    HEAD,
     in_metres,
+    LEG,
+    ODD,
     one_chain_of_each_kind,
-    positions,
 )
-from support.leg_fk_process import assert_one_line_complaint, leg_fk
+
+ORDERS = {'standard': ['Rz', 'tz', 'tx', 'Rx'], 'modified': ['Rx', 'tx', 'Rz', 'tz']}
+V1_LEG = Case('left_leg=v1', 'dh')
 
 
 @every_chain
-def test_the_answer_is_the_chains_pose(words, chain):
-    q = positions(chain, 1)
-    e = json.loads(explain(*words, '--json', '--radians', *q))
+def test_the_answer_is_the_chains_pose(case):
+    chain, (q, words) = case.chain, case.radians(1)
+    e = case.json(*words)
     assert np.abs(in_metres(e['T_root_tip']) - chain.forward(q)).max() < 1e-12
     assert (e['chain'], e['version']) == (chain.name, chain.version)
     assert (e['root_frame'], e['frame_id']) == (chain.root_frame, chain.frame_id)
 
 
 @every_chain
-def test_each_step_follows_from_the_one_before(words, chain):
-    e = json.loads(explain(*words, '--json', '--radians', *positions(chain, 2)))
+def test_each_step_follows_from_the_one_before(case):
+    _, words = case.radians(2)
+    e = case.json(*words)
     T_0 = np.eye(4)
     for link, product in zip(e['links'], e['running_products'], strict=True):
-        order = ['Rx', 'tx', 'Rz', 'tz'] if chain.convention == 'modified' else [
-            'Rz', 'tz', 'tx', 'Rx']
-        assert list(link['factors']) == order
+        assert list(link['factors']) == ORDERS[e['convention']]
         factors = [np.array(factor) for factor in link['factors'].values()]
         assert np.allclose(np.linalg.multi_dot(factors), link['A'], rtol=0, atol=1e-10)
         T_0 = T_0 @ link['A']
@@ -44,14 +56,15 @@ def test_each_step_follows_from_the_one_before(words, chain):
 
 
 @every_chain
-def test_the_frames_obey_the_first_four_steps_of_the_method(words, chain):
-    e = json.loads(explain(*words, '--json', '--radians', *positions(chain, 3)))
+def test_the_frames_obey_the_first_four_steps_of_the_method(case):
+    _, words = case.radians(3)
+    e = case.json(*words)
     n = len(e['links']) + 1
     assert e['frame_names'][:n] == [str(i) for i in range(n)]
     assert len(e['frames']) == n + len(e['after_last_link'])
     frames = e['frames'][:n]
     for own, other in zip(frames[1:], frames, strict=False):
-        if chain.convention == 'modified':  # where x_i is orthogonal to the axis behind it
+        if e['convention'] == 'modified':  # where x_i is orthogonal to the next axis
             own, other = other, own
         assert abs(np.dot(own['x'], other['z'])) < 1e-12
         assert abs(np.dot(own['x'], own['z'])) < 1e-12
@@ -61,36 +74,64 @@ def test_the_frames_obey_the_first_four_steps_of_the_method(words, chain):
         assert abs(np.dot(np.cross(other['z'], own['x']), reach)) < 1e-9
 
 
-@pytest.mark.parametrize(('words', 'position'), [
-    (['left_leg', '--version', 'v1'], (0, -68.1, -597.5)),
-    (['right_leg', '--version', 'v1'], (0, 68.1, -597.5)),
-    (['left_leg', '--version', 'v2_5'], (4.4175, -68.1, -622.995)),
-    (['right_leg', '--version', 'v2_5'], (4.4175, 68.1, -622.995)),
-    (['head_imu', '--version', 'v2'], (13, 6.6, 375.6)),
+@settings(max_examples=30)
+@given(chains_and_positions())
+def test_any_table_in_either_convention_is_explained(drawn):
+    standard, (q, *_) = drawn
+    modified = replace(standard, links=standard_rows(standard.links), convention='modified')
+    for chain in (standard, modified):
+        e = explained(chain, q)
+        assert np.abs(in_metres(e.T_root_tip) - chain.forward(q)).max() < 1e-12
+        assert as_text(e) and as_latex(e)
+
+
+@pytest.mark.parametrize(('name', 'position'), [
+    ('left_leg=v1', 'x = 0, y = -68.1, z = -597.5'),
+    ('right_leg=v1', 'x = 0, y = 68.1, z = -597.5'),
+    ('left_leg=v2_5', 'x = 4.4175, y = -68.1, z = -622.995'),
+    ('right_leg=v2_5', 'x = 4.4175, y = 68.1, z = -622.995'),
+    ('head_imu=v2', 'x = 13, y = 6.6, z = 375.6'),
 ])
-def test_at_zero_the_text_ends_with_the_documented_position(words, position):
-    text = explain(*words, '--degrees', *[0] * 6)
-    x, y, z = position
-    assert f'is at x = {x:g}, y = {y:g}, z = {z:g} mm in root_link.' in text.splitlines()[-1]
+def test_at_zero_the_text_ends_with_the_documented_position(name, position):
+    text = explain(name, '--degrees', *[0] * 6)
+    assert f'is at {position} mm in root_link.' in text.splitlines()[-1]
+
+
+def numbers(words):
+    return [float(word) for word in re.findall(r'-?\d+(?:\.\d+)?', words)]
+
+
+@one_chain_of_each_kind
+def test_text_latex_and_json_give_the_same_answer(case):
+    _, words = case.radians(4)
+    text, latex = case.explain(*words), case.explain('--latex', *words)
+    answer = np.ravel(case.json(*words)['T_root_tip'])
+    in_text = ' '.join(re.findall(r'\[(.*)\]', text)[-4:])
+    in_latex = re.findall(r'\\begin\{bmatrix\}(.*)\\end\{bmatrix\}', latex)[-1]
+    assert numbers(in_text) == pytest.approx(answer, abs=6e-5)
+    assert numbers(in_latex) == numbers(in_text)
+    sentence = next(line for line in text.splitlines() if ' is at x = ' in line)
+    assert sentence.replace('_', r'\_') in latex.replace('$-$', '-')
 
 
 def test_numbers_stand_with_their_points_under_each_other():
-    lines = explain('left_leg', '--degrees', 10, 12, 14, -30, -15, 5).splitlines()
+    lines = LEG.explain('--degrees', 10, 12, 14, -30, -15, 5).splitlines()
     first = next(i for i, line in enumerate(lines) if 'T_RoLf = T_Ro0 T_06 = [' in line) - 1
-    points = [[match.start() for match in re.finditer(r'\.', line)]
-              for line in lines[first:first + 3]]
+    points = []
+    for line in lines[first:first + 3]:
+        points.append([match.start() for match in re.finditer(r'\.', line)])
     assert len(points[0]) == 4 and points[0] == points[1] == points[2]
 
 
 @one_chain_of_each_kind
-def test_every_line_fits_a_terminal(words, chain):
-    for values in ([], ['--radians', *positions(chain, 4)]):
-        for line in explain(*words, *values).splitlines():
-            assert len(line) <= 100, line
+def test_every_line_fits_a_terminal(case):
+    _, words = case.radians(5)
+    for text in (case.explain(), case.explain(*words)):
+        assert max(map(len, text.splitlines())) <= 100
 
 
 def test_a_prismatic_arm_is_explained_as_the_textbook_has_it():
-    text = explain('arm', '-k', EXAMPLES / 'cylindrical_arm.yaml', '--version', 'v1')
+    text = ARM.explain()
     # T_03 of Spong, Hutchinson and Vidyasagar's example 3.2, with d_1 = 400 and their d_2, d_3.
     assert text.count('T_RoE = T_Ro0 T_03 =') == 1
     rows = [' '.join(row.split()) for row in re.findall(r'\[([^]]*)\]', text)[-4:]]
@@ -99,48 +140,68 @@ def test_a_prismatic_arm_is_explained_as_the_textbook_has_it():
 
 
 def test_the_steps_are_walked_in_order():
-    text = explain('left_leg', '--degrees', *[0] * 6)
+    text = LEG.explain('--degrees', *[0] * 6)
     places = [text.index(f'Step {i}.') for i in range(1, 7)]
     assert places == sorted(places)
     for words in ('A_5 = T_56 = Rz(theta_5) tz(d_5) tx(a_5) Rx(alpha_5)', 'T_06 = T_05 A_5',
-                  'T_Ro0 =', 'T_RoLf = T_Ro0 T_06'):
+                  'T_Ro0 =', 'T_RoLf = T_Ro0 T_06', 'z_2 ends, 0.9175 mm away',
+                  'z_0 and z_1 meet here', 'z_4 parallel to z_3, 200.5 mm away'):
         assert words in text
-    assert 'z_2 ends, 0.9175 mm away' in text and 'z_0 and z_1 meet here' in text
-    assert 'z_4 parallel to z_3, 200.5 mm away' in text
+
+
+@pytest.mark.parametrize('case', [LEG, V1_LEG, ODD])
+def test_text_and_json_give_the_same_ranges(case):
+    zeros = ['--degrees', *[0] * case.chain.n]
+    text = ' '.join(case.explain(*zeros).split())
+    for link, row in zip(case.json(*zeros)['links'], case.chain.rows(), strict=True):
+        if link['printed_range']:
+            lower, upper = np.degrees(link['printed_range']).tolist()
+            assert f'({lower:g} -> {upper:+g})' in text
+        if link['range'] != link['printed_range']:
+            assert link['range'] == list(row.link.limits)
+            assert f'{row.joint} {joint_range(row.link)}' in text
+    assert ('Ranges of robots' in text) == (case is LEG)
+
+
+def test_rows_that_follow_another_joint_are_named_as_such():
+    text = ODD.explain()
+    assert 'a row that follows elbow turns about it' in text
+    table = [' '.join(line.split()) for line in text.splitlines() if line.startswith('  i = ')]
+    assert table[1] == 'i = 1 250 0 pi -40.107 - (-90 -> +90) elbow'
+    assert table[5:] == ['i = 5 30 0 -pi/2 5.7296 + 0.5 q follows elbow',
+                         'i = 6 0 200 + 0.349066 q 0 0 follows shoulder']  # mm per degree
+    assert 'theta_5 = 0.5 q_1 + 0.1' in text and 'd_6 = 20 q_0 + 200' in text
 
 
 @pytest.mark.parametrize(('words', 'complaint'), [
     ([], 'CHAIN'),
-    (['left_foot'], "unknown chain 'left_foot'; known: left_leg, right_leg, head_imu"),
+    (['left_foot'], "unknown chain 'left_foot'"),
     (['left_leg', '--version', 'v4'], 'known: v1, v2_5, v3'),
     (['left_leg', '--foot-frame', 'toe'], 'known: dh, sole'),
-    (['left_leg', '--degrees', '1', '2'], 'found 2, allowed: 6, in the order l_hip_pitch'),
-    (['left_leg', '--degrees', 'x'], "found 'x', allowed: finite numbers"),
+    (['left_leg', '--degrees', '1', '2'], 'in the order l_hip_pitch'),
+    (['left_leg', '--degrees', 'x'], "'x'"),
     (['left_leg', '--json', '--latex'], 'not allowed with'),
     (['left_leg', '--degrees', '1', '--radians', '1'], 'not allowed with'),
     (['left_leg', '-k', 'missing.yaml'], 'missing.yaml'),
 ])
-def test_a_mistake_is_one_line_and_exit_2(words, complaint):
-    assert_one_line_complaint(leg_fk('explain', *words), complaint)
+def test_a_mistake_is_one_line_and_exit_2(words, complaint, capsys):
+    assert main(['explain', *words]) == 2
+    output, error = capsys.readouterr()
+    assert output == '' and error.count('\n') == 1
+    assert error.startswith('leg_fk: error: ') and complaint in error
 
 
 def test_joints_outside_their_range_are_said_as_in_pose():
-    text = explain('left_leg', '--degrees', 0, -30, 0, 0, 0, 0)
+    outside = ['--degrees', 0, -30, 0, 0, 0, 0]
+    text = LEG.explain(*outside)
     note = ' '.join(text[text.index('note:'):].split())
     assert note.startswith('note: l_hip_roll = -30 deg is outside its range -20 .. 120 deg')
     assert 'never clamped' in note
-    assert 'never clamped' in explain('left_leg', '--latex', '--degrees', 0, -30, 0, 0, 0, 0)
-    assert 'note:' not in explain('left_leg', '--degrees', 0, 30, 0, 0, 0, 0)
+    assert 'never clamped' in LEG.explain('--latex', *outside)
+    assert 'note:' not in LEG.explain('--degrees', 0, 30, 0, 0, 0, 0)
 
 
-def test_the_head_sensors_transform_is_told_as_the_fixed_row_of_its_document():
-    text = ' '.join(explain('head_imu', '--version', 'v2', '--degrees', *[0] * 6).split())
-    assert ('T_nIs is what a last fixed row would be, whose joint stays at 0: a = 0, d = 6.6, '
-            'alpha = pi/2, theta = 0') in text
-    assert 'z_Is = ( 0 0 1) as T_nIs has it' in text
-
-
-def test_latex_ends_with_the_sentence_that_the_text_ends_with():
-    words = ['left_leg', '--degrees', 0, 10, 0, -30, -15, 5]
-    sentence = explain(*words).splitlines()[-1]
-    assert sentence.replace('_', r'\_') in explain(*words, '--latex')
+def test_the_head_sensors_transform_is_the_fixed_row_of_its_document():
+    text = HEAD.explain('--degrees', *[0] * 6)
+    assert 'T_nIs equals a last fixed row: a = 0, d = 6.6, alpha = pi/2, theta = 0' in text
+    assert 'z_Is = ( 0 0 1) as T_nIs has it' in ' '.join(text.split())

@@ -176,7 +176,7 @@ DOORS = {
 
 
 @pytest.mark.parametrize('door', DOORS)
-@pytest.mark.parametrize('q', NOT_NUMBERS, ids=lambda q: repr(q)[:30])
+@pytest.mark.parametrize('q', NOT_NUMBERS, ids=lambda q: repr(q)[:20])
 def test_a_bad_joint_vector_is_refused_by_every_door_in_one_line(q: object, door: str) -> None:
     if door == 'poses' and type(q) is np.ma.MaskedArray:
         q = np.ma.array([q])

@@ -195,6 +195,6 @@ def test_simulated_time_that_has_not_begun(watch):
 
 
 def test_another_node_of_the_same_name(watch):
-    line = ('another node is called /node and publishes the same topics; another name for one of '
-            'them: --ros-args -r __node:=NAME')
+    line = ('another node is called /node and publishes the same topics; give one of them another '
+            'name: --ros-args -r __node:=NAME')
     check_is_said_twice(watch, line, patience=5, pose_publishers=['/node', '/other', '/node'])

@@ -50,12 +50,16 @@ def test_every_pose_is_pinocchios(walk):
                 oracle_pose(chain, 'v2_5', row[part], 'sole'), rtol=0, atol=1e-12)
 
 
+def matrices(poses):
+    return np.array([pose_matrix(message.pose) for message in poses])
+
+
 def test_soles_are_parallel_and_level_while_both_feet_stand(walk):
     _, _, forces, poses = walk
     both = (forces > STANDING).all(axis=1)
     assert both.sum() > 200
-    left, right = (np.array([pose_matrix(message.pose) for message in poses[foot]])[both]
-                   for foot in FEET)
+    left = matrices(poses['left_foot'])[both]
+    right = matrices(poses['right_foot'])[both]
     normals = np.einsum('ij,ij->i', left[:, :3, 2], right[:, :3, 2])
     angle_deg = np.degrees(np.arccos(np.clip(normals, -1, 1)))
     # Of the right sole above the left one, on the floor that the left one is level with.

@@ -1,8 +1,11 @@
 """The chains that `leg_fk explain` is tried on, and running it."""
 
 from contextlib import redirect_stdout
+from functools import cache
 from io import StringIO
+import json
 from pathlib import Path
+from typing import NamedTuple
 
 from icub_leg_fk.__main__ import main
 from icub_leg_fk.kinematics import Catalog
@@ -11,66 +14,68 @@ import pytest
 
 HERE = Path(__file__).parent
 EXAMPLES = HERE.parents[1] / 'config' / 'examples'
-
-CASES = [
-    *((None, name, version, frame) for name in ('left_leg', 'right_leg')
-      for version in ('v1', 'v2_5', 'v3') for frame in ('dh', 'sole')),
-    (None, 'head_imu', 'v2', 'dh'),
-    (EXAMPLES / 'cylindrical_arm.yaml', 'arm', 'v1', 'dh'),
-    (EXAMPLES / 'ur5.yaml', 'ur5', 'series_3', 'dh'),
-    (EXAMPLES / 'panda.yaml', 'panda', 'fci', 'flange'),
-    (HERE / 'odd_arm.yaml', 'odd_arm', 'v1', 'dh'),
-    (HERE / 'odd_arm.yaml', 'odd_arm', 'v1', 'sole'),
-]
-
-
-def _words_and_chain(file, name, version, frame):
-    words = [name, '--version', version, '--foot-frame', frame]
-    chain = Catalog.load(file).chain(name, version, frame)
-    return words + (['-k', str(file)] if file else []), chain
-
-
-def _each_of(cases):
-    return pytest.mark.parametrize(('words', 'chain'), [_words_and_chain(*case) for case in cases],
-                                   ids=['-'.join(case[1:]) for case in cases])
-
-
-every_chain = _each_of(CASES)
-one_chain_of_each_kind = _each_of([CASES[2], CASES[11], *CASES[12:]])
-
-
-LONG_ARM = """\
-units: {length: mm, angle: deg}
-chains:
-  arm:
-    tip: tip
-    root_frame: base
-    joints: [j0, j1, j2, j3, j4, j5, j6, j7, j8, j9, j10, j11, j12]
-    tip_frames: {dh: {frame: tip}}
-    versions:
-      v1:
-        T_Ro0: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
-        links:
-          - {a: 0, d: 0, alpha: 90, offset: 0, type: prismatic}
-          - {a: 10, d: 0, alpha: 0, offset: 0}
-          - {a: 0, d: 0, alpha: 90, offset: 0}
-""" + 9 * '          - {a: 0, d: 0, alpha: 0, offset: 0, type: prismatic}\n' + (
-    '          - {a: 10, d: 0, alpha: 0, offset: 0}\n')
-"""More than ten joints, of which 1 and 2 turn about parallel axes, and 12 turns too."""
+ODD_ARM = HERE / 'odd_arm.yaml'
 
 
 def explain(*words):
     """Return what `leg_fk explain` prints."""
+    return _explain(*map(str, words))
+
+
+@cache  # formulas take seconds
+def _explain(*words):
     with redirect_stdout(StringIO()) as output:
-        assert main(['explain', *map(str, words)]) == 0
+        assert main(['explain', *words]) == 0
     return output.getvalue()
 
 
-def positions(chain, seed):
-    return np.random.default_rng(seed).uniform(-1, 1, chain.n).tolist()
+class Case(NamedTuple):
+    """A chain in one of its tip's frames."""
+
+    name: str
+    frame: str
+    file: Path | None = None
+
+    @property
+    def chain(self):
+        return Catalog.load(self.file).chain(self.name, frame=self.frame)
+
+    def explain(self, *words):
+        file = ['-k', self.file] if self.file else []
+        return explain(self.name, '--foot-frame', self.frame, *file, *words)
+
+    def json(self, *words):
+        return json.loads(self.explain('--json', *words))
+
+    def radians(self, seed):
+        """Return joint positions, and the words that give them."""
+        q = np.random.default_rng(seed).uniform(-1, 1, self.chain.n).tolist()
+        return q, ['--radians', *q]
+
+
+LEG = Case('left_leg', 'dh')
+HEAD = Case('head_imu', 'dh')
+ARM = Case('arm', 'dh', EXAMPLES / 'cylindrical_arm.yaml')
+UR5 = Case('ur5', 'dh', EXAMPLES / 'ur5.yaml')
+PANDA = Case('panda', 'flange', EXAMPLES / 'panda.yaml')
+ODD = Case('odd_arm', 'sole', ODD_ARM)
+
+OF_EACH_KIND = [LEG, Case('right_leg=v3', 'sole'), HEAD, ARM, UR5, PANDA, ODD]
+LEGS = [Case(f'{side}_leg={version}', frame) for side in ('left', 'right')
+        for version in ('v1', 'v2_5', 'v3') for frame in ('dh', 'sole')]
+
+
+def _name(case):
+    return f'{case.name}-{case.frame}'
+
+
+every_chain = pytest.mark.parametrize(
+    'case', [*LEGS, HEAD, ARM, UR5, PANDA, ODD, ODD._replace(frame='dh')], ids=_name)
+one_chain_of_each_kind = pytest.mark.parametrize('case', OF_EACH_KIND, ids=_name)
 
 
 def in_metres(T):
+    """Return a transform in mm in metres."""
     T = np.array(T, dtype=float)
     T[:3, 3] /= 1000
     return T

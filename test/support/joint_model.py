@@ -133,39 +133,48 @@ class JointModel:
         for name in names:
             if names.count(name) > 1:
                 return self.reject('duplicate_name')
-        brought = [name for name in names if any(name in chain for chain in self.chains.values())]
+        wanted = [joint for chain in self.chains.values() for joint in chain]
+        brought = [name for name in names if name in wanted]
         if not brought:
             return []
         self.joints_by_frame_id.setdefault(message.frame_id, set()).update(brought)
         if self.has_stepped_back(stamp, brought):
             self.reject('time_jump')
             self.held = {}
-        for i in range(len(names)):
-            if names[i] in brought:
-                has_velocities = len(message.velocities) == len(names)
-                velocity = message.velocities[i] if has_velocities else math.nan
-                self.held[names[i]] = Held(stamp, message.positions[i], velocity)
-        ready = []
+        for name in brought:
+            self.held[name] = self.seen(stamp, message, names.index(name))
+        return self.ready_chains(brought)
+
+    def ready_chains(self, brought):
+        vectors = []
         for name, chain in self.chains.items():
-            if any(joint in brought for joint in chain):
-                if self.is_ready(name):
-                    positions = tuple(self.held[joint].position for joint in chain)
-                    ready.append((name, positions, self.velocities(name)))
-                    self.ready[name] += 1
-                else:
-                    self.silent[name] += 1
-        return ready
+            if chain.keys().isdisjoint(brought):
+                continue
+            if self.is_ready(name):
+                positions = tuple(self.held[joint].position for joint in chain)
+                vectors.append((name, positions, self.velocities(name)))
+                self.ready[name] += 1
+            else:
+                self.silent[name] += 1
+        return vectors
+
+    def seen(self, stamp, message, place):
+        velocity = math.nan
+        if len(message.velocities) == len(message.names):
+            velocity = message.velocities[place]
+        return Held(stamp, message.positions[place], velocity)
 
     def reject(self, reason):
         self.rejected[reason] += 1
         return []
 
     def has_stepped_back(self, stamp, brought):
-        for joint in brought:
-            if joint in self.held and self.held[joint].stamp > stamp:
+        for joint, held in self.held.items():
+            if joint in brought and held.stamp > stamp:
                 return True
-        return self.timeout > 0 and any(
-            held.stamp - stamp > self.timeout for held in self.held.values())
+            if self.timeout > 0 and held.stamp - stamp > self.timeout:
+                return True
+        return False
 
     def is_ready(self, name):
         chain = self.chains[name]
