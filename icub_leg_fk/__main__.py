@@ -23,6 +23,7 @@ COMMANDS = {  # and what they are for
     'pose': 'the pose of a foot, or any tip, for one joint vector',
     'explain': 'explain a chain: DH table, each A_i, products, answer',
     'bag': 'copy a bag and add the poses of the feet, as the node sends them',
+    'poses': 'the poses of a recording as numbers: CSV, or arrays for numpy',
     'plot': 'a picture of the feet over time and the legs in space, from a bag or CSV',
     'table': 'make the DH table of any robot from its URDF, as a kinematics file',
     'compare': 'compare a robot, given by its URDF, with the versions of the tables',

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from contextlib import closing
-from dataclasses import replace
 import os
 from pathlib import Path
 import sys
@@ -23,6 +22,7 @@ from icub_leg_fk.tools.output_file import check_target, is_bag
 from icub_leg_fk.tools.recording import JointRecording
 from icub_leg_fk.tools.replay import Answers, Replay
 from icub_leg_fk.tools.terminal import import_rich
+from icub_leg_fk.tools.tracks import ChainTrack, track_of
 import numpy as np
 
 EXAMPLES = """\
@@ -30,7 +30,7 @@ Starts the node foot_pose_publisher in its own process, plays a synthetic walkin
 recording, to it over DDS, shows the poses of both feet as they arrive, and at the end draws them.
 It talks inside this machine only, in a namespace of its own, and in a ROS_DOMAIN_ID of its own
 unless you have set one: no robot is disturbed. Exit status 0 if every pose arrived. A recording
-is a CSV file with a column `time` in seconds and one per leg joint, in radians.
+is a bag, a CSV file with a column `time` and one per leg joint, or a log of YARP.
 
 examples:
   leg_fk demo
@@ -47,7 +47,7 @@ _COLOURS = ('color(97)', 'color(172)')  # of the left and the right foot, as in 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     parser.add_argument('--recording', metavar='FILE', type=Path,
-                        help='CSV file to play, in its own timing (default: a synthetic gait)')
+                        help='recording to play, in its own timing (default: a synthetic gait)')
     parser.add_argument('--seconds', metavar='S', type=options.number_between(0.1, 3600),
                         help='how long to play (default: the whole recording)')
     parser.add_argument('--save', metavar='DIR', type=Path,
@@ -96,8 +96,7 @@ def _legs(catalog: Catalog, args: argparse.Namespace) -> list[Chain]:
 
 def _recording(args: argparse.Namespace, chains: Sequence[Chain]) -> JointRecording:
     file = args.recording or config_file('examples/synthetic_walk.csv')
-    joints = [joint for chain in chains for joint in chain.joint_names]
-    recording = recordings.read_csv(file, joints)
+    recording = recordings.read_joints([file], chains)
     return recording if args.seconds is None else recording.first(args.seconds)
 
 
@@ -126,12 +125,14 @@ def _play(recording: JointRecording, chains: Sequence[Chain]) -> tuple[Replay, b
 
 
 def _tracks(recording: JointRecording, chains: Sequence[Chain], answers: Sequence[Answers]
-            ) -> list[recordings.ChainTrack]:
+            ) -> list[ChainTrack]:
     """Return the chains with the poses that have come."""
     tracks = []
     for chain, received in zip(chains, answers, strict=True):
-        track = replace(recording.track(chain), received=received.poses)
-        tracks.append(track.where(np.isfinite(received.latencies)))
+        came = np.isfinite(received.latencies)
+        positions = recording.positions_of(chain)
+        tracks.append(track_of(chain, recording.times[came], positions[came],
+                               received.poses[came]))
     return tracks
 
 

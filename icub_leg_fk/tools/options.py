@@ -1,7 +1,7 @@
 """What subcommands share: options by their names, and the chains and joint positions they mean."""
 
 import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 import math
 import sys
@@ -9,6 +9,7 @@ from typing import Any
 
 from icub_leg_fk.errors import JointVectorError, LegFKError, UnknownNameError
 from icub_leg_fk.kinematics import Catalog, Chain, ChainEntry
+from icub_leg_fk.stream.configuration import LEGS
 
 LARGEST = 1e9  # of a joint position; beyond it a float's last turn is lost anyway
 
@@ -78,6 +79,44 @@ def load_chain(args: argparse.Namespace) -> tuple[Catalog, Chain]:
     catalog = load_catalog(args)
     with advice_on_chains(catalog):
         return catalog, catalog.chain(args.chain, args.version, args.foot_frame)
+
+
+def chosen_chains(args: argparse.Namespace) -> list[Chain]:
+    """Return the chains that the options name, or both legs, or else all that there are."""
+    catalog = load_catalog(args)
+    legs = [name for name in LEGS if name in catalog.chains]
+    with advice_on_chains(catalog):
+        chains = catalog.select(args.chains or legs or list(catalog.chains), args.version)
+    roots = sorted({chain.root_frame for chain in chains})
+    if len(roots) > 1:
+        raise LegFKError(f'--chains: found the root frames {", ".join(roots)}, allowed: chains of '
+                         'one root frame')
+    if args.foot_frame is None:
+        return list(chains)
+    return _in_frame(chains, args.foot_frame)
+
+
+def print_notes(warnings: Iterable[str], notes: Iterable[str]) -> None:
+    """Print what a user should know of an input, each in a line on stderr."""
+    for warning in warnings:
+        print(f'leg_fk: warning: {warning}', file=sys.stderr)
+    for note in notes:
+        print(f'leg_fk: note: {note}', file=sys.stderr)
+
+
+def _in_frame(chains: Sequence[Chain], frame: str) -> list[Chain]:
+    """Return chains in a frame that at least one of them has, with a line on those without it."""
+    if not any(frame in chain.tip_frames for chain in chains):
+        return [chain.with_frame(frame) for chain in chains]  # which says what there is
+    framed = []
+    for chain in chains:
+        if frame in chain.tip_frames:
+            framed.append(chain.with_frame(frame))
+        else:
+            framed.append(chain)
+            print(f'leg_fk: note: {chain.name} has no {frame} frame; its pose is that of '
+                  f'{chain.frame_id}', file=sys.stderr)
+    return framed
 
 
 @contextmanager
@@ -206,8 +245,16 @@ _OPTIONS: dict[str, dict[str, Any]] = {
                 'or sole, x forward, y left, z up'},
     '--joint-topic': {
         'metavar': 'TOPIC',
-        'help': "the bag's topic of joint states (default: /joint_states, or the only one there "
+        'nargs': '+',
+        'dest': 'joint_topics',
+        'default': (),
+        'help': "the bag's topics of joint states (default: /joint_states, or the only one there "
                 'is)'},
+    '--time-unit': {
+        'metavar': '{s,ms,us,ns}',
+        'choices': ('s', 'ms', 'us', 'ns'),
+        'default': '',
+        'help': 'unit of the times in a CSV file (default: told by their size and the header)'},
     '--json': {
         'action': 'store_true',
         'help': 'print JSON, for programs'},
