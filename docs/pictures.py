@@ -52,7 +52,7 @@ def draw_foot(figure, box, leg, axes):
     T = leg.forward(STANDING)
     sole = leg.sole_outline(STANDING) - T[:3, 3]
     T[:3, 3] = 0.0
-    seen = np.array([(0.05, 0.03, 0.0), (-0.12, -0.1, 0.0), (0.0, 0.0, 0.15)])
+    seen = np.array([(0.05, 0.03, 0.0), (-0.12, -0.1, 0.0), (0.0, 0.0, 0.12)])
     space = Space(figure, box, seen, azimuth=222.0, elevation=24.0)
     space.fill(sole, color_of(leg), 5, 0.3)
     space.line(

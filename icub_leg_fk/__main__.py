@@ -41,6 +41,7 @@ examples:
   leg_fk pose left_leg --degrees 0 10 0 -30 -15 5
   leg_fk explain left_leg
   leg_fk bag walking.mcap walking_with_poses.mcap
+  leg_fk poses walking.mcap -o feet.csv
   leg_fk plot walking.mcap -o feet.png
   leg_fk table my_robot.urdf --root root_link --tips l_sole r_sole -o my_robot.yaml
   leg_fk compare my_robot.urdf

@@ -85,7 +85,7 @@ def import_matplotlib() -> ModuleType:
 
 
 @contextmanager
-def _own_settings() -> Iterator[None]:
+def own_settings() -> Iterator[None]:
     """Let matplotlib draw with its defaults and this module's settings."""
     matplotlib = import_matplotlib()
     with matplotlib.rc_context():
@@ -110,7 +110,7 @@ def save_picture(draw: Callable[[], Figure], path: str | Path, *, force: bool, d
     kind = Path(path).suffix.lower().lstrip('.')
     no_date = {'svg': {'Date': None}, 'pdf': {'CreationDate': None}}
     try:
-        with _own_settings(), whole_path(path, force=force) as new:
+        with own_settings(), whole_path(path, force=force) as new:
             draw().savefig(new, format=kind, dpi=dpi, metadata=no_date.get(kind))
     except ValueError as error:
         raise LegFKError(f'{path}: cannot be drawn: {error}') from error

@@ -219,7 +219,7 @@ class _Trace:
         self._waiting = array('d')  # positions of samples that are in no row yet
         self._rows: list[Array] = []
         self._size = 1  # samples of a row
-        self._outside: list[NDArray[np.bool_]] = []
+        self._outside: list[NDArray[np.uint8]] = []  # (K, 2 n), a bit per sample
         R_zero = chain.poses(np.zeros((1, chain.n)))[0, 3:]
         self._zero = R_zero * (-1.0, -1.0, -1.0, 1.0)  # which turns back from there
 
@@ -272,7 +272,8 @@ class _Trace:
 
     def _keep(self, Q: Array, poses: Array) -> None:
         """Keep rows of a block of samples; where there are too many, each two become one."""
-        self._outside.append(np.hstack([Q < self._chain.lower, Q > self._chain.upper]))
+        is_outside = np.hstack([Q < self._chain.lower, Q > self._chain.upper])
+        self._outside.append(np.packbits(is_outside, axis=0))
         coordinates = np.hstack([poses[:, :3], self._turns(poses[:, 3:])])
         samples = np.hstack([Q, poses, coordinates, coordinates])
         self._rows.append(_merged(samples, self._size))
@@ -290,12 +291,13 @@ class _Trace:
 
     def _outside_ranges(self, stamps: NDArray[np.int64], start: int) -> list[OutOfRange]:
         """Return when joints were outside their ranges, up to the sample after."""
-        masks = np.concatenate(self._outside).T
+        bits = np.concatenate(self._outside)
         found = []
-        for place in np.flatnonzero(masks.any(axis=1)).tolist():
+        for place in np.flatnonzero(bits.any(axis=0)).tolist():
             joint = place % self._chain.n
             is_above = place >= self._chain.n
-            ends = np.flatnonzero(np.diff(masks[place], prepend=False, append=False))
+            is_outside = np.unpackbits(bits[:, place], count=len(stamps)).astype(bool)
+            ends = np.flatnonzero(np.diff(is_outside, prepend=False, append=False))
             times = _seconds(stamps[np.minimum(ends, len(stamps) - 1)], start)
             spans = list(zip(times[::2], times[1::2]))
             found.append(OutOfRange(self._chain, joint, is_above, spans))

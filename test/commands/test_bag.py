@@ -410,15 +410,29 @@ def test_poses_that_are_there_already_are_not_mixed_with_new_ones(tmp_path, reco
     )
 
 
-def test_another_joint_topic(tmp_path):
+def test_another_joint_topic_and_its_namespace(tmp_path):
     write_bag(tmp_path / 'in', joints=walk(10), topic='/robot/joints')
     assert_one_line_complaint(
-        run_main(
-            'bag', tmp_path / 'in', tmp_path / 'out', '--joint-topic', '/joint_states'
-        ),
+        run_main('bag', tmp_path / 'in', tmp_path / 'out', '--joint-topic', '/joint_states'),
         'no joint states on /joint_states; --joint-topic can be /robot/joints',
     )
-    assert add_foot_poses(tmp_path / 'in', tmp_path / 'out').added[LEFT_POSE] == 10
+    added = add_foot_poses(tmp_path / 'in', tmp_path / 'out').added
+    assert added == {f'/robot{LEFT_POSE}': 10, f'/robot{RIGHT_POSE}': 10}
+    added = add_foot_poses(tmp_path / 'in', tmp_path / 'root', namespace='').added
+    assert added == {LEFT_POSE: 10, RIGHT_POSE: 10}
+
+
+def test_two_robots_fit_into_one_bag(tmp_path):
+    topics = {f'/icub{i}/joint_states': (JOINT_STATE, [], walk(10)) for i in (1, 2)}
+    write_topics(tmp_path / 'in', topics)
+    add_foot_poses(tmp_path / 'in', tmp_path / 'one', joint_topics=['/icub1/joint_states'])
+    added = add_foot_poses(
+        tmp_path / 'one', tmp_path / 'two', joint_topics=['/icub2/joint_states']
+    ).added
+    assert added == {f'/icub2{LEFT_POSE}': 10, f'/icub2{RIGHT_POSE}': 10}
+    _, messages = read_bag(tmp_path / 'two')
+    for name in ('/icub1', '/icub2'):
+        assert_poses(messages, f'{name}{LEFT_POSE}', expected_poses(walk(10)))
 
 
 def test_a_zero_stamp_becomes_the_time_of_recording(tmp_path):
