@@ -10,17 +10,31 @@ SHARE = f'share/{PACKAGE}'
 # `colcon build --symlink-install` runs this file in a folder that has no README.
 README = Path(__file__).with_name('README.md')
 
-ROS, KILTED = ([f'ros-{release}-{name}' for name in (
-    'common-interfaces', 'rclpy', 'rmw-fastrtps-cpp')] for release in ('jazzy', 'kilted'))
-TOOLS = ['argcomplete', 'matplotlib>=3.6', 'rich', 'rosbags>=0.11.9,<0.12', 'sympy']
+ROS, KILTED = (
+    [
+        f'ros-{release}-{name}'
+        for name in ('common-interfaces', 'rclpy', 'rmw-fastrtps-cpp')
+    ]
+    for release in ('jazzy', 'kilted')
+)
+TOOLS = [
+    'argcomplete',
+    'matplotlib>=3.6',
+    'rich',
+    'rosbags>=0.11.9,<0.12',
+    'sympy',
+    'viser>=1.1',
+]
 TEST = [
     'colcon-common-extensions',
+    'cyclonedds>=11,<12',
     'distributed',
     'example-robot-data',
     'hypothesis',
     'icub-models',
     'mcap',
     'pin',
+    'playwright',
     'pytest>=7.4',
     'pytest-xdist',
     'roboticstoolbox-python',
@@ -72,8 +86,14 @@ setup(
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
         (SHARE, ['package.xml']),
-        (f'{SHARE}/config', [path for kind in ('yaml', 'rviz', 'json')
-                             for path in sorted(glob(f'config/*.{kind}'))]),
+        (
+            f'{SHARE}/config',
+            [
+                path
+                for kind in ('yaml', 'rviz', 'json')
+                for path in sorted(glob(f'config/*.{kind}'))
+            ],
+        ),
         (f'{SHARE}/config/examples', sorted(glob('config/examples/*'))),
         (f'{SHARE}/launch', sorted(glob('launch/*_launch.py'))),
     ],

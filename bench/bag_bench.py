@@ -28,7 +28,8 @@ _PLAIN = (sys.executable, '-m', 'bench.plain')
 _LABELS = {
     'ours': 'leg_fk bag',
     'twists': 'leg_fk bag --twist',
-    'plain': 'plain loop over rosbags'}
+    'plain': 'plain loop over rosbags',
+}
 
 
 class _Lengths(NamedTuple):
@@ -44,36 +45,50 @@ class _Run(NamedTuple):
 
 def measure_bag(report: Report, quick: bool) -> None:
     """Add speed, memory and two jobs."""
-    lengths = _Lengths(1, 2, 2) if quick else _Lengths(10, 90, 120)
+    lengths = _Lengths(1, 1, 1) if quick else _Lengths(10, 90, 120)
     with TemporaryDirectory(prefix='bench_bag_') as directory:
         runs, jobs = _run_all(Path(directory), lengths, rounds=1 if quick else 3)
     seconds = {}
     for name, of_name in runs.items():
         seconds[name] = [run.seconds for run in of_name]
-    report.note(f'\nleg_fk bag, mcap to mcap, one core, start included: {lengths.long} s at '
-                f'{_RATE} Hz, {len(ROBOT_JOINTS)} joints, two feet')
+    report.note(
+        f'\nleg_fk bag, mcap to mcap, one core, start included: {lengths.long} s at '
+        f'{_RATE} Hz, {len(ROBOT_JOINTS)} joints, two feet'
+    )
     count = lengths.long * _RATE
     for name, label in _LABELS.items():
-        report.row(f'{label}, per message', [s / count * 1e6 for s in seconds[name]], 'us')
+        report.row(
+            f'{label}, per message', [s / count * 1e6 for s in seconds[name]], 'us'
+        )
     report.row('times real time', [lengths.long / s for s in seconds['ours']], 'x')
-    report.row('bag, plain loop / here', ratio(seconds['plain'], seconds['ours']), 'x',
-               at_least=3.0)
+    report.row(
+        'bag, plain loop / here',
+        ratio(seconds['plain'], seconds['ours']),
+        'x',
+        at_least=3.0,
+    )
     for name, length in (('short', lengths.short), ('ours', lengths.long)):
         peaks = [run.peak for run in runs[name]]
         report.row(f'bag, peak memory, {length} s', peaks, 'MB', at_most=80.0)
-    report.row(f'bag, two of {lengths.jobs} s, --jobs 1 / --jobs 2', ratio(jobs[1], jobs[2]), 'x',
-               at_least=1.6)
+    report.row(
+        f'bag, two of {lengths.jobs} s, --jobs 1 / --jobs 2',
+        ratio(jobs[1], jobs[2]),
+        'x',
+        at_least=1.6,
+    )
 
 
-def _run_all(folder: Path, lengths: _Lengths, rounds: int
-             ) -> tuple[dict[str, list[_Run]], dict[int, list[float]]]:
+def _run_all(
+    folder: Path, lengths: _Lengths, rounds: int
+) -> tuple[dict[str, list[_Run]], dict[int, list[float]]]:
     """Return the runs of each way, and the seconds that two bags take by number of jobs."""
     long = _write_bag(folder / 'long', lengths.long)
     commands = {
         'ours': [*_OURS, long],
         'plain': [*_PLAIN, long],
         'twists': [*_OURS, '--twist', long],
-        'short': [*_OURS, _write_bag(folder / 'short', lengths.short)]}
+        'short': [*_OURS, _write_bag(folder / 'short', lengths.short)],
+    }
     pair = [_write_bag(folder / name, lengths.jobs) for name in ('one', 'two')]
     runs: dict[str, list[_Run]] = {name: [] for name in commands}
     jobs: dict[int, list[float]] = {1: [], 2: []}
@@ -90,16 +105,40 @@ def _run_all(folder: Path, lengths: _Lengths, rounds: int
 def _write_bag(path: Path, seconds: int) -> str:
     """Write an mcap bag of JointStates at 1 kHz and return its path."""
     store = get_typestore(Stores.ROS2_JAZZY)
-    JointState, Header, Time = (store.types[name] for name in (
-        JOINT_STATE, 'std_msgs/msg/Header', 'builtin_interfaces/msg/Time'))
+    JointState, Header, Time = (
+        store.types[name]
+        for name in (JOINT_STATE, 'std_msgs/msg/Header', 'builtin_interfaces/msg/Time')
+    )
     zeros = np.zeros(len(ROBOT_JOINTS))
-    gait = [bytes(store.serialize_cdr(JointState(
-        Header(Time(0, 0), ''), [*ROBOT_JOINTS], np.array(joint_positions(i / _GAIT_MESSAGES)),
-        zeros, zeros), JOINT_STATE)) for i in range(_GAIT_MESSAGES)]
+    gait = [
+        bytes(
+            store.serialize_cdr(
+                JointState(
+                    Header(Time(0, 0), ''),
+                    [*ROBOT_JOINTS],
+                    np.array(joint_positions(i / _GAIT_MESSAGES)),
+                    zeros,
+                    zeros,
+                ),
+                JOINT_STATE,
+            )
+        )
+        for i in range(_GAIT_MESSAGES)
+    ]
     stamps = range(_START, _START + seconds * 1_000_000_000, 1_000_000_000 // _RATE)
-    write_joint_states(path, (
-        (stamp, gait[i % _GAIT_MESSAGES][:4] + struct.pack('<iI', *divmod(stamp, 1_000_000_000))
-         + gait[i % _GAIT_MESSAGES][12:]) for i, stamp in enumerate(stamps)), force=False)
+    write_joint_states(
+        path,
+        (
+            (
+                stamp,
+                gait[i % _GAIT_MESSAGES][:4]
+                + struct.pack('<iI', *divmod(stamp, 1_000_000_000))
+                + gait[i % _GAIT_MESSAGES][12:],
+            )
+            for i, stamp in enumerate(stamps)
+        ),
+        force=False,
+    )
     return str(path)
 
 
@@ -112,7 +151,9 @@ def _time(command: Sequence[str], output: Path, one_core: bool = False) -> _Run:
     process = subprocess.Popen([*command, str(output)], stdout=subprocess.DEVNULL)
     os.sched_setaffinity(0, cores)
     peak = 0
-    while process.poll() is None:  # what wait4 tells is at least the peak of this process
+    while (
+        process.poll() is None
+    ):  # what wait4 tells is at least the peak of this process
         peak = max(peak, resident_bytes(process.pid, 'VmHWM:'))
         with suppress(subprocess.TimeoutExpired):
             process.wait(timeout=0.02)

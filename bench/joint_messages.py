@@ -3,12 +3,36 @@
 import math
 
 ROBOT_JOINTS = (
-    *(f'{part}_{axis}' for part in ('torso', 'neck') for axis in ('pitch', 'roll', 'yaw')),
-    *(f'{side}_{joint}' for side in 'lr' for joint in (
-        'shoulder_pitch', 'shoulder_roll', 'shoulder_yaw', 'elbow', 'wrist_prosup', 'wrist_pitch',
-        'wrist_yaw')),
-    *(f'{side}_{joint}' for side in 'lr' for joint in (
-        'hip_pitch', 'hip_roll', 'hip_yaw', 'knee', 'ankle_pitch', 'ankle_roll')),
+    *(
+        f'{part}_{axis}'
+        for part in ('torso', 'neck')
+        for axis in ('pitch', 'roll', 'yaw')
+    ),
+    *(
+        f'{side}_{joint}'
+        for side in 'lr'
+        for joint in (
+            'shoulder_pitch',
+            'shoulder_roll',
+            'shoulder_yaw',
+            'elbow',
+            'wrist_prosup',
+            'wrist_pitch',
+            'wrist_yaw',
+        )
+    ),
+    *(
+        f'{side}_{joint}'
+        for side in 'lr'
+        for joint in (
+            'hip_pitch',
+            'hip_roll',
+            'hip_yaw',
+            'knee',
+            'ankle_pitch',
+            'ankle_roll',
+        )
+    ),
 )
 """The 32 joints of the simulated iCub; the last twelve are the legs'."""
 

@@ -20,19 +20,23 @@ from typing import Any, NamedTuple
 from bench.joint_messages import joint_positions, ROBOT_JOINTS
 from bench.report import cpu_ns, ratio, Report
 from geometry_msgs.msg import PoseStamped, TwistStamped
+from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.stream.configuration import LEGS
 from icub_leg_fk.tools.replay import (
     DemoError,
     lossless,
     running_node,
     stay_on_this_machine,
 )
+from icub_leg_fk.tools.urdf_text import urdf_text
 import rclpy
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 
 FEET = ('left_foot', 'right_foot')
 _OURS, _REFERENCES = 'icub_leg_fk.node.main', 'bench.reference_nodes'
@@ -42,11 +46,13 @@ class _Kind(NamedTuple):
     program: tuple[str, ...]
     publish_twist: bool = False
     reliable: bool = True  # whether its subscribers are
+    described: bool = False  # whether it computes with a description of the robot
 
 
 _NODES = {
     'floor': _Kind((_REFERENCES, 'floor')),
     'here': _Kind((_OURS,)),
+    'here, with a description': _Kind((_OURS,), described=True),
     'plain': _Kind((_REFERENCES, 'plain')),
     'here, with two twists': _Kind((_OURS,), publish_twist=True),
     'here, best-effort subscribers': _Kind((_OURS,), reliable=False),
@@ -88,20 +94,31 @@ def measure_node(report: Report, quick: bool) -> None:
                 latencies, lost = load.send(nodes[name], _RATE, count, _QUIET)
                 cpu_us = (cpu_ns(nodes[name].pid) - before) / 1000 / count
                 stretches[name].append(
-                    _Stretch(cpu_us, statistics.median(latencies or [math.nan]), lost))
+                    _Stretch(cpu_us, statistics.median(latencies or [math.nan]), lost)
+                )
     _report_cpu(report, stretches)
     _report_latency(report, stretches)
 
 
 def _report_cpu(report: Report, stretches: dict[str, list[_Stretch]]) -> None:
     cpu = _figures(stretches, 'cpu')
-    report.note(f'\nnode: CPU per message, two feet, {_RATE:.0f} Hz, {len(ROBOT_JOINTS)} joints')
+    report.note(
+        f'\nnode: CPU per message, two feet, {_RATE:.0f} Hz, {len(ROBOT_JOINTS)} joints'
+    )
     for name, readings in cpu.items():
         report.row(f'CPU, {name}', readings, 'us')
         lost = sum(_figures(stretches, 'lost')[name])
         if lost:
-            report.note(f'  {name}: {lost} of its messages were lost, expect odd figures')
+            report.note(
+                f'  {name}: {lost} of its messages were lost, expect odd figures'
+            )
     report.row('CPU, here / floor', ratio(cpu['here'], cpu['floor']), 'x', at_most=1.25)
+    report.row(
+        'CPU, with a description / without',
+        ratio(cpu['here, with a description'], cpu['here']),
+        'x',
+        at_most=1.03,
+    )
     report.row('CPU, here / plain', ratio(cpu['here'], cpu['plain']), 'x', at_most=0.32)
 
 
@@ -113,7 +130,9 @@ def _report_latency(report: Report, stretches: dict[str, list[_Stretch]]) -> Non
     report.row('p50, here / floor', ratio(p50['here'], p50['floor']), 'x', at_most=1.2)
 
 
-def _figures(stretches: dict[str, list[_Stretch]], figure: str) -> dict[str, list[float]]:
+def _figures(
+    stretches: dict[str, list[_Stretch]], figure: str
+) -> dict[str, list[float]]:
     """Return one figure of all stretches, by node."""
     figures = {}
     for name, of_name in stretches.items():
@@ -127,9 +146,11 @@ def _start(stack: ExitStack, load: _Load, namespace: str, kind: _Kind) -> _Node:
     if kind.program == (_OURS,):
         parameters = lossless(namespace, FEET, _DEPTH)
         parameters['publish_twist'] = str(kind.publish_twist).lower()
+        parameters['description_from_topic'] = str(kind.described).lower()
     # In sessions of their own Linux would share out the cores among the nodes differently.
     process, check = stack.enter_context(
-        running_node(namespace, parameters, kind.program, own_session=False))
+        running_node(namespace, parameters, kind.program, own_session=False)
+    )
     node = _Node(namespace, process.pid, load.watch(namespace, kind))
     for _ in range(100):
         check()
@@ -153,24 +174,45 @@ class _Load:
 
     def watch(self, namespace: str, kind: _Kind) -> list[list[int]]:
         """Subscribe to the poses, and twists, of a node; return where their arrivals go."""
-        arrivals = [self._watch(namespace, PoseStamped, f'{foot}/pose', kind) for foot in FEET]
+        if kind.described:
+            self._describe(namespace)
+        arrivals = [
+            self._watch(namespace, PoseStamped, f'{foot}/pose', kind) for foot in FEET
+        ]
         if kind.publish_twist:
-            arrivals += [self._watch(namespace, TwistStamped, f'{foot}/twist', kind)
-                         for foot in FEET]
+            arrivals += [
+                self._watch(namespace, TwistStamped, f'{foot}/twist', kind)
+                for foot in FEET
+            ]
         return arrivals
 
-    def _watch(self, namespace: str, message: Any, topic: str, kind: _Kind) -> list[int]:
+    def _describe(self, namespace: str) -> None:
+        """Send a description of the robot, as robot_state_publisher does."""
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        publisher = self._node.create_publisher(
+            String, f'{namespace}/robot_description', latched
+        )
+        publisher.publish(String(data=urdf_text('icub', Catalog.load().select(LEGS))))
+
+    def _watch(
+        self, namespace: str, message: Any, topic: str, kind: _Kind
+    ) -> list[int]:
         arrived: list[int] = []
         reliability = ReliabilityPolicy.BEST_EFFORT
         if kind.reliable:
             reliability = ReliabilityPolicy.RELIABLE
         self._node.create_subscription(
-            message, f'{namespace}/foot_pose_publisher/{topic}',
+            message,
+            f'{namespace}/foot_pose_publisher/{topic}',
             lambda data: arrived.append(time.time_ns()),
-            QoSProfile(depth=_DEPTH, reliability=reliability), raw=True)
+            QoSProfile(depth=_DEPTH, reliability=reliability),
+            raw=True,
+        )
         return arrived
 
-    def send(self, node: _Node, rate: float, count: int, quiet: float) -> tuple[list[float], int]:
+    def send(
+        self, node: _Node, rate: float, count: int, quiet: float
+    ) -> tuple[list[float], int]:
         """Send messages through a node; return the latencies of its poses [us] and its losses."""
         for arrivals in node.arrivals:
             arrivals.clear()
@@ -188,7 +230,7 @@ class _Load:
         sent = self._connection.recv()
         # Paired by their order, since ready-made poses carry no stamp of theirs.
         latencies: list[float] = []
-        for arrivals in node.arrivals[:len(FEET)]:
+        for arrivals in node.arrivals[: len(FEET)]:
             latencies += [(at - by) / 1000 for by, at in zip(sent, arrivals)]
         return latencies, max(count - len(arrivals) for arrivals in node.arrivals)
 
@@ -207,10 +249,19 @@ def _robot(connection: Connection) -> None:
     meanwhile, waking it up would be most of the cost of every node.
     """
     node, qos = _node('robot')
-    gait = [bytearray(serialize_message(JointState(
-        name=ROBOT_JOINTS, velocity=[0.0] * len(ROBOT_JOINTS), effort=[0.0] * len(ROBOT_JOINTS),
-        position=joint_positions(2 * math.pi * i / _GAIT_MESSAGES))))
-        for i in range(_GAIT_MESSAGES)]
+    gait = [
+        bytearray(
+            serialize_message(
+                JointState(
+                    name=ROBOT_JOINTS,
+                    velocity=[0.0] * len(ROBOT_JOINTS),
+                    effort=[0.0] * len(ROBOT_JOINTS),
+                    position=joint_positions(2 * math.pi * i / _GAIT_MESSAGES),
+                )
+            )
+        )
+        for i in range(_GAIT_MESSAGES)
+    ]
     publishers: dict[str, Any] = {}
     gc.disable()
     while True:

@@ -30,11 +30,14 @@ def foot_matrix(chain: Chain, q: Sequence[float]) -> Array:
         theta = link.offset + angle
         ct, st = math.cos(theta), math.sin(theta)
         ca, sa = math.cos(link.alpha), math.sin(link.alpha)
-        T = T @ np.array([
-            [ct, -st * ca, st * sa, link.a * ct],
-            [st, ct * ca, -ct * sa, link.a * st],
-            [0.0, sa, ca, link.d],
-            [0.0, 0.0, 0.0, 1.0]])
+        T = T @ np.array(
+            [
+                [ct, -st * ca, st * sa, link.a * ct],
+                [st, ct * ca, -ct * sa, link.a * st],
+                [0.0, sa, ca, link.d],
+                [0.0, 0.0, 0.0, 1.0],
+            ]
+        )
     return T
 
 
@@ -65,20 +68,37 @@ def add_poses(source: Path, target: Path) -> None:
     from rosbags.typesys import get_typestore, Stores
 
     store = get_typestore(Stores.ROS2_JAZZY)
-    PoseStamped, Header, Pose, Point, Quaternion = (store.types[name] for name in (
-        POSE, 'std_msgs/msg/Header', 'geometry_msgs/msg/Pose', 'geometry_msgs/msg/Point',
-        'geometry_msgs/msg/Quaternion'))
+    PoseStamped, Header, Pose, Point, Quaternion = (
+        store.types[name]
+        for name in (
+            POSE,
+            'std_msgs/msg/Header',
+            'geometry_msgs/msg/Pose',
+            'geometry_msgs/msg/Point',
+            'geometry_msgs/msg/Quaternion',
+        )
+    )
     legs = chains()
-    with AnyReader([source]) as reader, \
-            Writer(target, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+    with (
+        AnyReader([source]) as reader,
+        Writer(target, version=9, storage_plugin=StoragePlugin.MCAP) as writer,
+    ):
         copies = {
             connection.id: writer.add_connection(
-                connection.topic, connection.msgtype, msgdef=connection.msgdef.data,
+                connection.topic,
+                connection.msgtype,
+                msgdef=connection.msgdef.data,
                 rihs01=reader.typestore.hash_rihs01(connection.msgtype),
-                offered_qos_profiles=connection.ext.offered_qos_profiles)
-            for connection in reader.connections}
-        outputs = [writer.add_connection(f'/foot_pose_publisher/{leg.tip}/pose', POSE,
-                                         typestore=store) for leg in legs]
+                offered_qos_profiles=connection.ext.offered_qos_profiles,
+            )
+            for connection in reader.connections
+        }
+        outputs = [
+            writer.add_connection(
+                f'/foot_pose_publisher/{leg.tip}/pose', POSE, typestore=store
+            )
+            for leg in legs
+        ]
         for connection, timestamp, data in reader.messages():
             writer.write(copies[connection.id], timestamp, data)
             if connection.topic != '/joint_states':
@@ -87,8 +107,10 @@ def add_poses(source: Path, target: Path) -> None:
             angles = dict(zip(message.name, message.position, strict=True))
             for leg, output in zip(legs, outputs, strict=True):
                 T = foot_matrix(leg, [angles[name] for name in leg.joint_names])
-                pose = PoseStamped(Header(message.header.stamp, leg.root_frame),
-                                   Pose(Point(*T[:3, 3]), Quaternion(*quaternion(T))))
+                pose = PoseStamped(
+                    Header(message.header.stamp, leg.root_frame),
+                    Pose(Point(*T[:3, 3]), Quaternion(*quaternion(T))),
+                )
                 writer.write(output, timestamp, store.serialize_cdr(pose, POSE))
 
 

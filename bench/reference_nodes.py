@@ -32,12 +32,14 @@ def floor(node: Node, publishers: list[Publisher]) -> None:
     def relay(data: bytes) -> None:
         left.publish(ready)
         right.publish(ready)
+
     node.create_subscription(JointState, 'joint_states', relay, QOS, raw=True)
 
 
 def plain(node: Node, publishers: list[Publisher]) -> None:
     """Compute with numpy, 4x4 matrix by 4x4 matrix."""
     from bench.plain import chains, foot_matrix, quaternion
+
     legs = chains()
 
     def publish_poses(message: JointState) -> None:
@@ -47,10 +49,17 @@ def plain(node: Node, publishers: list[Publisher]) -> None:
             pose = PoseStamped()
             pose.header.stamp = message.header.stamp
             pose.header.frame_id = leg.root_frame
-            pose.pose.position.x, pose.pose.position.y, pose.pose.position.z = T[:3, 3].tolist()
-            (pose.pose.orientation.x, pose.pose.orientation.y, pose.pose.orientation.z,
-             pose.pose.orientation.w) = quaternion(T)
+            pose.pose.position.x, pose.pose.position.y, pose.pose.position.z = T[
+                :3, 3
+            ].tolist()
+            (
+                pose.pose.orientation.x,
+                pose.pose.orientation.y,
+                pose.pose.orientation.z,
+                pose.pose.orientation.w,
+            ) = quaternion(T)
             publisher.publish(pose)
+
     node.create_subscription(JointState, 'joint_states', publish_poses, QOS)
 
 
@@ -60,10 +69,17 @@ def main() -> None:
     signal.signal(signal.SIGINT, lambda number, frame: stop.set())
     rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
     node = Node('foot_pose_publisher')
-    set_up, executor = {'floor': (floor, EventsExecutor()),
-                        'plain': (plain, SingleThreadedExecutor())}[sys.argv[1]]
-    set_up(node, [node.create_publisher(PoseStamped, f'~/{tip}/pose', QOS)
-                  for tip in ('left_foot', 'right_foot')])
+    set_up, executor = {
+        'floor': (floor, EventsExecutor()),
+        'plain': (plain, SingleThreadedExecutor()),
+    }[sys.argv[1]]
+    set_up(
+        node,
+        [
+            node.create_publisher(PoseStamped, f'~/{tip}/pose', QOS)
+            for tip in ('left_foot', 'right_foot')
+        ],
+    )
     executor.add_node(node)
     while not stop.is_set():
         executor.spin_once(timeout_sec=0.25)

@@ -5,8 +5,9 @@ import sys
 
 from icub_leg_fk.commands.plot import default_instants
 from icub_leg_fk.kinematics import config_file, load_chain
+from icub_leg_fk.stream.colors import color_of
 from icub_leg_fk.tools.drawing import feet_figure, new_figure, save_picture
-from icub_leg_fk.tools.space import Box, color_of, FAINT, Space
+from icub_leg_fk.tools.space import Box, FAINT, Space
 from icub_leg_fk.tools.tracks import read_tracks
 import numpy as np
 

@@ -25,6 +25,7 @@ COMMANDS = {  # and what they are for
     'bag': 'copy a bag and add the poses of the feet, as the node sends them',
     'poses': 'the poses of a recording as numbers: CSV, or arrays for numpy',
     'plot': 'a picture of the feet over time and the legs in space, from a bag or CSV',
+    'view': 'a page in the browser: sliders, poses, the DH method step by step',
     'table': 'make the DH table of any robot from its URDF, as a kinematics file',
     'compare': 'compare a robot, given by its URDF, with the versions of the tables',
     'urdf': 'write chains as a URDF, for RViz, Pinocchio and others',
@@ -43,6 +44,7 @@ examples:
   leg_fk bag walking.mcap walking_with_poses.mcap
   leg_fk poses walking.mcap -o feet.csv
   leg_fk plot walking.mcap -o feet.png
+  leg_fk view
   leg_fk table my_robot.urdf --root root_link --tips l_sole r_sole -o my_robot.yaml
   leg_fk compare my_robot.urdf
   leg_fk urdf left_leg right_leg -o legs.urdf
@@ -57,10 +59,14 @@ _NOBODY_READS = 128 + 13  # as it reports SIGPIPE
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; return 0, or 2 after a mistake, which is one line on stderr."""
     words = sys.argv[1:] if argv is None else list(argv)
+    if sys.stderr is None:  # it is closed, and print would take standard output
+        sys.stderr = open(os.devnull, 'w', encoding='utf-8')
     if '_ARGCOMPLETE' in os.environ:
         _complete(os.environ['COMP_LINE'])
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors='backslashreplace')  # a terminal that is not UTF-8
+        sys.stdout.reconfigure(
+            errors='backslashreplace'
+        )  # a terminal that is not UTF-8
     try:
         status = _run(words)
         if sys.stdout:
@@ -94,7 +100,9 @@ def parse(words: list[str]) -> argparse.Namespace:
     command = words[0] if words else '-h'
     if command in parsers:
         parsers[command].refuse_unknown_options(words[1:])
-        return parsers[command].parse_intermixed_args(words[1:])  # as in: bag IN --twist OUT
+        return parsers[command].parse_intermixed_args(
+            words[1:]
+        )  # as in: bag IN --twist OUT
     if not command.startswith('-'):
         raise UnknownNameError('command', command, COMMANDS, 'leg_fk -h explains them')
     parser.refuse_unknown_options(words)
@@ -103,11 +111,16 @@ def parse(words: list[str]) -> argparse.Namespace:
 
 def _parsers(words: Sequence[str]) -> tuple[Parser, dict[str, Parser]]:
     """Return the command's parser, and its subcommands'; only the one asked for has options."""
-    parser = Parser(prog='leg_fk', usage='leg_fk COMMAND ...', description=DESCRIPTION,
-                    epilog=EXAMPLES)
+    parser = Parser(
+        prog='leg_fk',
+        usage='leg_fk COMMAND ...',
+        description=DESCRIPTION,
+        epilog=EXAMPLES,
+    )
     parser.add_argument('--version', action='version', version=f'leg_fk {__version__}')
-    subparsers = parser.add_subparsers(title='commands', metavar='COMMAND', required=True,
-                                       prog='leg_fk')
+    subparsers = parser.add_subparsers(
+        title='commands', metavar='COMMAND', required=True, prog='leg_fk'
+    )
     for name, purpose in COMMANDS.items():
         subparser = subparsers.add_parser(name, help=purpose, description=purpose)
         if name in words[:1]:
@@ -121,6 +134,7 @@ def _parsers(words: Sequence[str]) -> tuple[Parser, dict[str, Parser]]:
 def _complete(line: str) -> None:
     """Offer the shell what may follow, and end the process."""
     from argcomplete import autocomplete  # which has had the shell set the variables
+
     parser, _ = _parsers(line.split()[1:])
     autocomplete(parser)
 

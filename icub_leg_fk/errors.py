@@ -19,25 +19,35 @@ class UnknownNameError(LegFKError):
     """A name that is not among the known ones.
 
     Attributes:
-        kind: what the name was meant for, such as `chain` or `version of chain left_leg`.
+        kind: what the name was meant for, such as `chain` or `version`.
         name: the name that was given.
         choices: the names that exist.
         advice: what else may help; empty if nothing.
+        of: what should have the name, such as `chain left_leg`; empty if that is clear.
     """
 
-    def __init__(self, kind: str, name: str, choices: Iterable[str], advice: str = '') -> None:
+    def __init__(
+        self,
+        kind: str,
+        name: str,
+        choices: Iterable[str],
+        advice: str = '',
+        of: str = '',
+    ) -> None:
         self.kind = kind
         self.name = name
         self.choices = tuple(choices)
         self.advice = advice
-        super().__init__(kind, name, self.choices, advice)
+        self.of = of
+        super().__init__(kind, name, self.choices, advice, of)
 
     def __str__(self) -> str:
         guess = closest(self.name, self.choices) if isinstance(self.name, str) else None
         hint = f'did you mean {guess!r}? ' if guess else ''
         known = ', '.join(self.choices) or 'none'
         advice = f'; {self.advice}' if self.advice else ''
-        return f'unknown {self.kind} {reprlib.repr(self.name)}; {hint}known: {known}{advice}'
+        of = f' of {self.of}' if self.of else ''
+        return f'unknown {self.kind} {reprlib.repr(self.name)}{of}; {hint}known: {known}{advice}'
 
 
 class VersionNeededError(LegFKError):
@@ -54,8 +64,10 @@ class VersionNeededError(LegFKError):
         super().__init__(chain, self.versions)
 
     def __str__(self) -> str:
-        return (f'chain {self.chain} has several versions and no default; give one of '
-                f'{", ".join(self.versions)}')
+        return (
+            f'chain {self.chain} has several versions and no default; give one of '
+            f'{", ".join(self.versions)}'
+        )
 
 
 class JointVectorError(LegFKError):
@@ -85,13 +97,13 @@ class InputFileError(LegFKError):
         fault: what is wrong with it.
     """
 
-    def __init__(self, file: str, fault: str = '') -> None:
+    def __init__(self, file: str, fault: str) -> None:
         self.file = file
         self.fault = fault
         super().__init__(file, fault)
 
     def __str__(self) -> str:
-        return f'{self.file}: {self.fault}' if self.fault else self.file
+        return f'{self.file}: {self.fault}'
 
 
 class CatalogError(InputFileError):
@@ -106,7 +118,9 @@ class CatalogError(InputFileError):
         allowed: what may stand there.
     """
 
-    def __init__(self, file: str, line: int, where: str, found: str, allowed: str) -> None:
+    def __init__(
+        self, file: str, line: int, where: str, found: str, allowed: str
+    ) -> None:
         fault = f'{where}: found {found}, allowed: {allowed}' if where else found
         super().__init__(file, fault)
         self.line = line
@@ -130,13 +144,13 @@ class OutputFileError(LegFKError):
         fault: what is wrong with it.
     """
 
-    def __init__(self, file: str, fault: str = '') -> None:
+    def __init__(self, file: str, fault: str) -> None:
         self.file = file
         self.fault = fault
         super().__init__(file, fault)
 
     def __str__(self) -> str:
-        return f'{self.file}: {self.fault}' if self.fault else self.file
+        return f'{self.file}: {self.fault}'
 
 
 class MalformedMessageError(LegFKError):
@@ -164,13 +178,13 @@ class ParameterError(LegFKError):
         fault: what is wrong with it, and what is allowed.
     """
 
-    def __init__(self, parameter: str, fault: str = '') -> None:
+    def __init__(self, parameter: str, fault: str) -> None:
         self.parameter = parameter
         self.fault = fault
         super().__init__(parameter, fault)
 
     def __str__(self) -> str:
-        return f'parameter {self.parameter}: {self.fault}' if self.fault else self.parameter
+        return f'parameter {self.parameter}: {self.fault}'
 
 
 class MissingDependencyError(LegFKError):
@@ -182,13 +196,11 @@ class MissingDependencyError(LegFKError):
         install: the line that installs it.
     """
 
-    def __init__(self, library: str, purpose: str = '', install: str = '') -> None:
+    def __init__(self, library: str, purpose: str, install: str) -> None:
         self.library = library
         self.purpose = purpose
         self.install = install
         super().__init__(library, purpose, install)
 
     def __str__(self) -> str:
-        if not self.purpose:
-            return self.library
         return f'{self.purpose} needs {self.library}, which is not installed: {self.install}'

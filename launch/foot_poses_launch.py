@@ -1,116 +1,242 @@
 """Start `foot_pose_publisher`; what is not given comes from the parameter file, or the defaults.
 
-`ros2 launch icub_leg_fk foot_poses_launch.py version:=v1 chains:='[left_leg]' rviz:=true`
+`ros2 launch icub_leg_fk foot_poses_launch.py chains:='[left_leg, head_imu=v2]' rviz:=true`
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-import re
+import sys
+from tempfile import NamedTemporaryFile
+from typing import Any
 
-from icub_leg_fk.errors import closest
-from icub_leg_fk.kinematics import config_file
-from launch import LaunchContext, LaunchDescription
-from launch.actions import DeclareLaunchArgument, OpaqueFunction
-from launch.substitutions import LaunchConfiguration
+from ament_index_python.packages import get_package_prefix, PackageNotFoundError
+from icub_leg_fk.errors import closest, LegFKError, UnknownNameError
+from icub_leg_fk.node.arguments import parameters_for
+from icub_leg_fk.node.parameters import (
+    configuration_of,
+    load_catalog,
+    Parameter,
+    PARAMETERS,
+)
+from icub_leg_fk.tools.rviz_config import rviz_config
+from launch import LaunchContext, LaunchDescription, Substitution
+from launch.actions import DeclareLaunchArgument, GroupAction, OpaqueFunction
+from launch.logging import get_logger
+from launch.substitutions import TextSubstitution
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.utilities import make_namespace_absolute, prefix_namespace
 
-# Parameters set by the argument of the same name: their type, and what the argument means.
-PARAMETERS = {
-    'version': (str, 'version of every chain that sets none of its own, such as v2_5'),
-    'chains': (list[str], "list of the chains to publish, such as '[left_leg, right_leg]'"),
-    'kinematics_file': (str, 'another kinematics file; empty is the shipped one'),
-    'foot_frame': (str, "a tip frame's name, of the iCub's feet dh or sole"),
-    'frame_prefix': (str, 'put before every frame id, such as icub1/'),
-    'publish_tf': (bool, 'true to broadcast the poses on /tf, too, or false'),
-    'publish_twist': (bool, 'true to publish the velocities of the feet, too, or false'),
-    'publish_markers': (bool, 'true to publish the skeletons, too, or false'),
-    'use_sim_time': (bool, 'true to take the time from /clock, or false'),
+NAME = 'foot_pose_publisher'
+SIM_TIME = Parameter(
+    'use_sim_time', False, 'Take the time from /clock.', 'true or false'
+)
+AS_PARAMETERS = (*PARAMETERS, SIM_TIME)
+OTHERS = {  # default and meaning
+    'joint_states': ('joint_states', 'Topic of the joint states.'),
+    'params_file': (
+        '',
+        'YAML file with node parameters; an argument given here wins over it.',
+    ),
+    'namespace': ('', 'Namespace of the node and of its topics.'),
+    'log_level': ('info', 'What the node logs: debug, info, warn, error or fatal.'),
+    'rviz': (
+        'false',
+        'Open RViz with the poses and the skeletons, for which publish_markers is '
+        'then true unless given.',
+    ),
 }
-OTHERS = {
-    'params_file': 'YAML file with node parameters',
-    'namespace': 'namespace of the node and of its topics',
-    'log_level': 'what the node logs: debug, info, warn, error or fatal',
-    'rviz': 'true to open RViz with the poses and the skeletons (publish_markers is then true '
-            'unless given), or false',
-}
-LOG_LEVELS = ('debug', 'info', 'warn', 'error', 'fatal')
-RVIZ_TOPICS = [f'/foot_pose_publisher/{name}'
-               for name in ('left_foot/pose', 'right_foot/pose', 'skeleton')]
+TRUTH = {'true': True, '1': True, 'false': False, '0': False, '': False}
+
+
+class Unset(Substitution):
+    """The default of an argument: nothing, but shown as what then counts.
+
+    Args:
+        shown: the value that counts where neither argument nor parameter file gives one.
+    """
+
+    def __init__(self, shown: str) -> None:
+        super().__init__()
+        self._shown = shown
+
+    def describe(self) -> str:
+        """Return what `--show-args` shows."""
+        return repr(self._shown)
+
+    def perform(self, context: LaunchContext) -> str:
+        """Return that nothing is given."""
+        return ''
 
 
 def generate_launch_description() -> LaunchDescription:
     """Describe the arguments, all of them optional, and the nodes."""
-    arguments = {name: description for name, (_, description) in PARAMETERS.items()} | OTHERS
-    return LaunchDescription([
-        *(DeclareLaunchArgument(name, default_value='', description=description)
-          for name, description in arguments.items()),
-        OpaqueFunction(function=nodes),
-    ])
+    arguments = []
+    for parameter in AS_PARAMETERS:
+        description = f'{parameter.description} Allowed: {parameter.allowed}.'
+        arguments.append(
+            DeclareLaunchArgument(
+                parameter.name,
+                default_value=Unset(written(parameter.default)),
+                description=description,
+            )
+        )
+    for name, (default, description) in OTHERS.items():
+        arguments.append(
+            DeclareLaunchArgument(
+                name, default_value=Unset(default), description=description
+            )
+        )
+    # In a group of its own nothing that is declared here is left behind for other launch files.
+    return LaunchDescription(
+        [GroupAction([*arguments, OpaqueFunction(function=nodes)])]
+    )
+
+
+def written(value: Any) -> str:
+    """Return a parameter's value as an argument is written."""
+    if isinstance(value, list):
+        return f'[{", ".join(value)}]'
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def nodes(context: LaunchContext) -> list[Node]:
     """Return the node, its parameters from the file and then from the arguments; and RViz."""
-    refuse_misspelt(context)
-    given = {name: LaunchConfiguration(name).perform(context) for name in (*PARAMETERS, *OTHERS)}
-    params_file, log_level = given['params_file'], given['log_level']
-    if params_file and not Path(params_file).is_file():
-        raise RuntimeError(f'argument params_file: found {params_file!r}, allowed: a file')
-    if log_level and log_level not in LOG_LEVELS:
-        raise RuntimeError(f'argument log_level: found {log_level!r}, allowed: '
-                           f'{", ".join(LOG_LEVELS)}')
-    if given['rviz'] not in ('', 'true', 'false'):
-        raise RuntimeError(f'argument rviz: found {given["rviz"]!r}, allowed: true or false')
-    overrides = {name: parameter(context, name) for name in PARAMETERS if given[name]}
-    rviz = given['rviz'] == 'true'
-    if rviz and not given['publish_markers']:
-        overrides['publish_markers'] = True
-    # Name and namespace are both given: only then are the overrides written for the node's full
-    # name, and only so do they win over a file that names the node as well.
-    publisher = Node(
+    refuse_misspelt(sys.argv)
+    given = {}
+    for name in (*(parameter.name for parameter in AS_PARAMETERS), *OTHERS):
+        given[name] = context.launch_configurations[name]
+    parameters: dict[str, ParameterValue] = {}
+    for parameter in AS_PARAMETERS:
+        if given[parameter.name]:
+            parameters[parameter.name] = parameter_value(
+                parameter, given[parameter.name], context
+            )
+    params_file = checked_file(given['params_file'])
+    with_rviz = truth('rviz', given['rviz'])
+    if with_rviz:
+        parameters.setdefault('publish_markers', ParameterValue(True, value_type=bool))
+    node = full_name(context, given['namespace'])
+    started = [publisher(given, params_file, parameters)]
+    if with_rviz:
+        values = {name: value.evaluate(context) for name, value in parameters.items()}
+        started += viewer(node, params_file, values)
+    return started
+
+
+def publisher(
+    given: Mapping[str, str], params_file: str, parameters: Mapping[str, ParameterValue]
+) -> Node:
+    """Return the node.
+
+    Name and namespace are both given: only then are the parameters written for the node's full
+    name, and only so do they win over a file that names the node as well.
+    """
+    log_level, topic = given['log_level'], given['joint_states']
+    return Node(
         package='icub_leg_fk',
-        executable='foot_pose_publisher',
-        name='foot_pose_publisher',
-        namespace=LaunchConfiguration('namespace'),
-        parameters=[item for item in (params_file, overrides) if item],
+        executable=NAME,
+        name=NAME,
+        namespace=given['namespace'],
+        parameters=[item for item in (params_file, dict(parameters)) if item],
+        remappings=[('joint_states', topic)] if topic else [],
         ros_arguments=['--log-level', log_level] if log_level else [],
         output='screen',
     )
-    return [publisher, viewer(given['namespace'], given['frame_prefix'])] if rviz else [publisher]
 
 
-def viewer(namespace: str, frame_prefix: str) -> Node:
-    """Return RViz with the shipped configuration, in a namespace and under a frame prefix."""
-    inside = f'/{namespace.strip("/")}' if namespace.strip('/') else ''
-    return Node(
-        package='rviz2',
-        executable='rviz2',
-        name='foot_poses_rviz',
-        arguments=['-d', str(config_file('foot_poses.rviz')), '-f', f'{frame_prefix}root_link'],
-        remappings=[(topic, inside + topic) for topic in RVIZ_TOPICS] if inside else [],
+def viewer(node: str, params_file: str, given: Mapping[str, Any]) -> list[Node]:
+    """Return RViz for what the node publishes; nothing where it is refused, or RViz is missing."""
+    values = {parameter.name: parameter.default for parameter in PARAMETERS}
+    try:
+        if params_file:
+            values |= parameters_for(params_file, node)
+        values |= given
+        ours = {parameter.name: values[parameter.name] for parameter in PARAMETERS}
+        catalog = load_catalog(ours['kinematics_file'], ours['root_frame'])
+        configuration = configuration_of(catalog, ours)
+    except (LegFKError, TypeError, AttributeError):  # the node says what is wrong
+        return []
+    try:
+        get_package_prefix('rviz2')
+    except PackageNotFoundError:
+        get_logger(NAME).warning('RViz is not installed; the node runs without it')
+        return []
+    with NamedTemporaryFile(
+        'w', prefix='foot_poses_', suffix='.rviz', delete=False
+    ) as file:
+        file.write(rviz_config(configuration, node))
+    return [
+        Node(
+            package='rviz2',
+            executable='rviz2',
+            name='foot_poses_rviz',
+            arguments=['-d', file.name],
+        )
+    ]
+
+
+def full_name(context: LaunchContext, namespace: str) -> str:
+    """Return the full name of the node, in a namespace that a launch file has pushed or not."""
+    pushed = context.launch_configurations.get('ros_namespace')
+    return (
+        make_namespace_absolute(prefix_namespace(pushed, namespace)).rstrip('/')
+        + f'/{NAME}'
     )
 
 
-def refuse_misspelt(context: LaunchContext) -> None:
-    """Refuse an argument whose name is nearly one of ours, which launch would pass over."""
-    ours = (*PARAMETERS, *OTHERS)
-    for name in context.launch_configurations:
-        if name not in ours and (guess := closest(name, ours)):
-            raise RuntimeError(f'unknown argument {name!r}; did you mean {guess!r}?')
+def refuse_misspelt(argv: Sequence[str]) -> None:
+    """Refuse an argument of nearly one of our names, which launch would pass over.
+
+    Only where this very file is launched: the arguments of another that includes it are its own.
+    """
+    if Path(__file__).name not in [Path(word).name for word in argv]:
+        return
+    ours = [*(parameter.name for parameter in AS_PARAMETERS), *OTHERS]
+    for word in argv:
+        name, assigns, _ = word.partition(':=')
+        if assigns and name not in ours and closest(name, ours):
+            raise RuntimeError(str(UnknownNameError('argument', name, ours)))
 
 
-def parameter(context: LaunchContext, name: str) -> ParameterValue:
+def parameter_value(
+    parameter: Parameter, found: str, context: LaunchContext
+) -> ParameterValue:
     """Return an argument as a parameter of its type."""
-    value_type, description = PARAMETERS[name]
-    argument = LaunchConfiguration(name)
-    found = argument.perform(context)
-    value = ParameterValue(argument, value_type=value_type)
+    kind = type(parameter.default)
+    if kind is bool:
+        return ParameterValue(truth(parameter.name, found), value_type=bool)
+    text = TextSubstitution(text=found)
+    value = ParameterValue(text, value_type=list[str] if kind is list else kind)
     try:
         value.evaluate(context)
-        if re.search(r',\s*\]\s*$', found):  # YAML passes over it, and a chain may be missing
-            raise ValueError('a comma before the bracket')
+        if kind is list and found.replace(' ', '').endswith(',]'):
+            raise ValueError('YAML passes over this comma, and a chain may be missing')
     except ValueError as error:
-        raise RuntimeError(
-            f'argument {name}: found {found!r}, allowed: {description}') from error
+        raise refusal(parameter.name, found, parameter.allowed) from error
     return value
+
+
+def truth(name: str, found: str) -> bool:
+    """Return what an argument says, as launch reads conditions."""
+    try:
+        return TRUTH[found.strip().lower()]
+    except KeyError as error:
+        raise refusal(name, found, 'true or false') from error
+
+
+def checked_file(params_file: str) -> str:
+    """Return the path of the parameter file, which launch would pass over if there is none."""
+    if not params_file:
+        return ''
+    file = Path(params_file).expanduser()
+    if not file.is_file():
+        raise refusal('params_file', params_file, 'a file')
+    return str(file)
+
+
+def refusal(name: str, found: str, allowed: str) -> RuntimeError:
+    """Return the error that ends the launch."""
+    return RuntimeError(f'argument {name}: found {found!r}, allowed: {allowed}')

@@ -37,8 +37,10 @@ os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
-# How long an example takes says nothing on a busy machine.
-settings.register_profile('icub_leg_fk', deadline=None)
+# How long an example takes says nothing on a busy machine. Every run tries other examples;
+# `make test ARGS=--hypothesis-profile=thorough` tries more of them.
+settings.register_profile('icub_leg_fk', deadline=None, max_examples=50)
+settings.register_profile('thorough', deadline=None, max_examples=1000)
 settings.load_profile('icub_leg_fk')
 
 
@@ -46,7 +48,13 @@ settings.load_profile('icub_leg_fk')
 def pytest_make_collect_report(collector):
     """Skip a file of tests, with the reason, whose imports from ROS 2 are not installed."""
     report = (yield).get_result()
-    missing = re.search(r"No module named '(rclpy|\w+_(?:msgs|interfaces))", str(report.longrepr))
+    missing = re.search(
+        r"No module named '(rclpy|\w+_(?:msgs|interfaces))", str(report.longrepr)
+    )
     if report.failed and missing:
         report.outcome = 'skipped'
-        report.longrepr = (str(collector.path), 1, f'Skipped: needs {missing[1]} of ROS 2')
+        report.longrepr = (
+            str(collector.path),
+            1,
+            f'Skipped: needs {missing[1]} of ROS 2',
+        )

@@ -28,9 +28,9 @@ import numpy as np
 EXAMPLES = """\
 Starts the node foot_pose_publisher in its own process, plays a synthetic walking gait, or a
 recording, to it over DDS, shows the poses of both feet as they arrive, and at the end draws them.
-It talks inside this machine only, in a namespace of its own, and in a ROS_DOMAIN_ID of its own
-unless you have set one: no robot is disturbed. Exit status 0 if every pose arrived. A recording
-is a bag, a CSV file with a column `time` and one per leg joint, or a log of YARP.
+It talks inside this machine only, in its own namespace, and in its own ROS_DOMAIN_ID unless
+you have set one: no robot is disturbed. Exit status 0 if every pose arrived. A recording is a bag,
+a CSV file with a column of times and one per leg joint in radians, or a log of YARP.
 
 examples:
   leg_fk demo
@@ -46,21 +46,35 @@ _COLOURS = ('color(97)', 'color(172)')  # of the left and the right foot, as in 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument('--recording', metavar='FILE', type=Path,
-                        help='recording to play, in its own timing (default: a synthetic gait)')
-    parser.add_argument('--seconds', metavar='S', type=options.number_between(0.1, 3600),
-                        help='how long to play (default: the whole recording)')
-    parser.add_argument('--save', metavar='DIR', type=Path,
-                        help='keep the joint states as a rosbag2 bag')
+    parser.add_argument(
+        '--recording',
+        metavar='FILE',
+        type=Path,
+        help='recording to play, in its own timing (default: a synthetic gait)',
+    )
+    parser.add_argument(
+        '--seconds',
+        metavar='S',
+        type=options.number_between(0.1, 3600),
+        help='how long to play (default: the whole recording)',
+    )
+    parser.add_argument(
+        '--save',
+        metavar='DIR',
+        type=Path,
+        help='keep the joint states as a rosbag2 bag',
+    )
     options.add(parser, '--version', '--foot-frame')
-    options.add_output(parser, 'picture to write, .png, .svg or .pdf (default: demo.png, which is '
-                       'replaced)')
+    options.add_output(
+        parser,
+        'picture to write, .png, .svg or .pdf (default: demo.png, which is replaced)',
+    )
     parser.set_defaults(kinematics_file=None)
 
 
 def run(args: argparse.Namespace) -> int:
     """Give the demonstration; return 1 if a pose is missing or the node failed."""
-    picture = Path(args.output or _DEFAULT_PICTURE)
+    picture = _DEFAULT_PICTURE if args.output is None else args.output
     may_replace = args.force or args.output is None
     check_output(picture, may_replace)
     if args.save:
@@ -73,13 +87,18 @@ def run(args: argparse.Namespace) -> int:
     except replays.DemoError as error:
         print(f'leg_fk: error: {error}', file=sys.stderr)
         return 1
-    status = conclude(replay.answers, recording.times[:len(replay.sent)].tolist(), is_whole)
+    status = conclude(
+        replay.answers, recording.times[: len(replay.sent)].tolist(), is_whole
+    )
     if is_whole and all(answers.arrived for answers in replay.answers):
         tracks = _tracks(recording, chains, replay.answers)
         name = args.recording.name if args.recording else 'synthetic gait'
         title = f'{name}   {chains[0].version}'
-        save_picture(lambda: feet_figure(tracks, default_instants(tracks), title), picture,
-                     force=may_replace)
+        save_picture(
+            lambda: feet_figure(tracks, default_instants(tracks), title),
+            picture,
+            force=may_replace,
+        )
         print(f'picture       {picture}', flush=True)
     if is_whole and args.save:
         recordings.write_joint_states(args.save, replay.sent, force=args.force)
@@ -105,15 +124,22 @@ def _play(recording: JointRecording, chains: Sequence[Chain]) -> tuple[Replay, b
     domain = replays.stay_on_this_machine()
     namespace = f'/leg_fk_demo_{os.getpid()}'
     version, frame = chains[0].version, chains[0].frame
-    print(f'iCub legs {version}: {len(recording.times)} JointState messages to '
-          'foot_pose_publisher, poses back over DDS')
-    print(f'(this machine only, ROS_DOMAIN_ID {domain}, namespace {namespace})\n', flush=True)
+    print(
+        f'iCub legs {version}: {len(recording.times)} JointState messages to '
+        'foot_pose_publisher, poses back over DDS'
+    )
+    print(
+        f'(this machine only, ROS_DOMAIN_ID {domain}, namespace {namespace})\n',
+        flush=True,
+    )
     tips = [chain.tip for chain in chains]
     parameters = {'version': version, 'foot_frame': frame}
     parameters |= replays.lossless(namespace, tips, replays.DEPTH)
     seconds = float(recording.times[-1] - recording.times[0])
-    with closing(Replay(recording, namespace, tips)) as replay, \
-            replays.running_node(namespace, parameters) as (_, check):
+    with (
+        closing(Replay(recording, namespace, tips)) as replay,
+        replays.running_node(namespace, parameters) as (_, check),
+    ):
         display = Display(replay.answers, seconds, chains[0].root_frame)
         replay.wait_for_node(check)
         try:
@@ -124,15 +150,16 @@ def _play(recording: JointRecording, chains: Sequence[Chain]) -> tuple[Replay, b
     return replay, True
 
 
-def _tracks(recording: JointRecording, chains: Sequence[Chain], answers: Sequence[Answers]
-            ) -> list[ChainTrack]:
+def _tracks(
+    recording: JointRecording, chains: Sequence[Chain], answers: Sequence[Answers]
+) -> list[ChainTrack]:
     """Return the chains with the poses that have come."""
     tracks = []
     for chain, received in zip(chains, answers, strict=True):
         came = np.isfinite(received.latencies)
-        positions = recording.positions_of(chain)
-        tracks.append(track_of(chain, recording.times[came], positions[came],
-                               received.poses[came]))
+        times = recording.times[came]
+        positions = recording.positions_of(chain)[came]
+        tracks.append(track_of(chain, times, positions, received.poses[came]))
     return tracks
 
 
@@ -160,8 +187,11 @@ def conclude(answers: Sequence[Answers], times: Sequence[float], is_whole: bool)
         return 128 + 2  # as a shell reports SIGINT
     unexpected = sum(answer.unexpected for answer in answers)
     if lost or unexpected:
-        print(f'leg_fk: error: of {sent * len(answers)} poses {lost} did not arrive, and '
-              f'{unexpected} arrived that belong to no message', file=sys.stderr)
+        print(
+            f'leg_fk: error: of {sent * len(answers)} poses {lost} did not arrive, and '
+            f'{unexpected} arrived that belong to no message',
+            file=sys.stderr,
+        )
         return 1
     return 0
 
@@ -195,7 +225,8 @@ class Display:
                 screen=True,
                 auto_refresh=False,
                 redirect_stdout=False,
-                redirect_stderr=False)
+                redirect_stderr=False,
+            )
         self.period = 0.1 if self._live else 1.0
 
     def __enter__(self) -> Display:
@@ -232,7 +263,10 @@ class Display:
         table = self._rich.table.Table(
             box=None,
             title=Text(f'poses in {self._frame}, in m'),
-            caption=Text(f'{self._elapsed:.2f} of {self._seconds:.2f} s, {poses} poses'))
+            caption=Text(
+                f'{self._elapsed:.2f} of {self._seconds:.2f} s, {poses} poses'
+            ),
+        )
         table.add_column(no_wrap=True)
         for name in _COLUMNS:
             table.add_column(Text(name), justify='right', no_wrap=True)

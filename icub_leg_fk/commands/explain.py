@@ -21,10 +21,15 @@ examples:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    options.add(parser, 'chain', '--version', '--foot-frame', '--kinematics-file')
+    options.add(
+        parser, 'chain', '--version', '--foot-frame', '--kinematics-file', '--root'
+    )
     options.add_joint_positions(parser, required=False)
-    parser.add_argument('--symbolic', action='store_true',
-                        help='exact numbers instead of decimals: pi/2, not 1.5708 (by sympy)')
+    parser.add_argument(
+        '--symbolic',
+        action='store_true',
+        help='exact numbers instead of decimals: pi/2, not 1.5708 (by sympy)',
+    )
     form = parser.add_mutually_exclusive_group()
     form.add_argument('--latex', action='store_true', help='print a LaTeX document')
     options.add(form, '--json')
@@ -33,7 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the explanation."""
     _, chain = options.load_chain(args)
-    explanation = explain(chain, options.joint_positions(args, chain), exact=args.symbolic)
+    explanation = explain(
+        chain, options.joint_positions(args, chain), exact=args.symbolic
+    )
     if args.json:
         print(as_json(explanation))
     elif args.latex:

@@ -17,12 +17,13 @@ _JOINTS_IN_A_LINE = 6
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    options.add(parser, '--kinematics-file', '--json')
+    options.add(parser, '--kinematics-file', '--root', '--json')
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the chains."""
     catalog = options.load_catalog(args)
+    options.refuse_no_chains(catalog)
     entries = catalog.chains.values()
     if args.json:
         chains = [_as_json(entry) for entry in entries]
@@ -37,7 +38,9 @@ def run(args: argparse.Namespace) -> int:
 
 def _as_text(entry: ChainEntry) -> list[str]:
     paragraphs = {
-        'tip': _by_version(entry, lambda chain: [f'{chain.tip}, in {chain.root_frame}']),
+        'tip': _by_version(
+            entry, lambda chain: [f'{chain.tip}, in {chain.root_frame}']
+        ),
         'root axes': _by_version(entry, _root_axes),
         'tip frames': _by_version(entry, _tip_frames),
         'versions': [_version(entry, version) for version in entry.versions],
@@ -84,8 +87,11 @@ def _version(entry: ChainEntry, version: str) -> str:
 
 def _joints(chain: Chain) -> list[str]:
     names = chain.joint_names
-    starts = range(0, chain.n, _JOINTS_IN_A_LINE)
-    return ['  '.join(names[start:start + _JOINTS_IN_A_LINE]) for start in starts]
+    lines = []
+    for start in range(0, chain.n, _JOINTS_IN_A_LINE):
+        end = start + _JOINTS_IN_A_LINE
+        lines.append('  '.join(names[start:end]))
+    return lines
 
 
 def _as_json(entry: ChainEntry) -> dict[str, Any]:

@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     name = _name(args.recordings)
     output = args.output or f'{Path(name).stem}.png'
     check_output(output, args.force)
-    chains = options.chosen_chains(args)
+    chains = options.chains_of_one_root(args)
     with shown_progress(name) as progress:
         tracks = _tracks(args.recordings, chains, args, _part(progress, 0.0))
         over = _tracks(args.over, chains, args, _part(progress, 0.5)) if args.over else []

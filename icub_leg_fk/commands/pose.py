@@ -22,7 +22,15 @@ _DECIMALS = 7
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    options.add(parser, 'chain', '--version', '--foot-frame', '--kinematics-file', '--json')
+    options.add(
+        parser,
+        'chain',
+        '--version',
+        '--foot-frame',
+        '--kinematics-file',
+        '--root',
+        '--json',
+    )
     options.add_joint_positions(parser, required=True)
 
 
@@ -40,19 +48,26 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _as_json(chain: Chain, T: Array, quaternion: list[float]) -> str:
-    return text.as_json({
-        'chain': chain.name,
-        'version': chain.version,
-        'root_frame': chain.root_frame,
-        'frame_id': chain.frame_id,
-        'position': T[:3, 3].tolist(),
-        'quaternion': quaternion,
-        'matrix': T.tolist(),
-    })
+    return text.as_json(
+        {
+            'chain': chain.name,
+            'version': chain.version,
+            'root_frame': chain.root_frame,
+            'frame_id': chain.frame_id,
+            'position': T[:3, 3].tolist(),
+            'quaternion': quaternion,
+            'matrix': T.tolist(),
+        }
+    )
 
 
-def _as_text(chain: Chain, q: list[float], T: Array, quaternion: list[float]) -> list[str]:
-    lines = [f'{chain.name} {chain.version}: {chain.frame_id} in {chain.root_frame}', '']
+def _as_text(
+    chain: Chain, q: list[float], T: Array, quaternion: list[float]
+) -> list[str]:
+    lines = [
+        f'{chain.name} {chain.version}: {chain.frame_id} in {chain.root_frame}',
+        '',
+    ]
     lines += text.indented(_joints(chain, q))
     lines += ['', 'matrix (translation in m)']
     matrix = [_numbers(row) for row in T[:3].tolist()]

@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
     """Write the table."""
     if args.output not in (None, STANDARD_OUTPUT):
         _check_output(args.output, args.force)
-    chains = options.chosen_chains(args)
+    chains = options.chains_of_one_root(args)
     columns = column_names(chains, args.twist)
     name = Path(args.recordings[0]).name
     with (

@@ -24,9 +24,12 @@ examples:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     options.add(parser, 'chains')
-    parser.add_argument('--name', metavar='NAME',
-                        help='name of the robot (default: icub, or that of your file)')
-    options.add(parser, '--version', '--kinematics-file')
+    parser.add_argument(
+        '--name',
+        metavar='NAME',
+        help='name of the robot (default: icub, or that of your file)',
+    )
+    options.add(parser, '--version', '--kinematics-file', '--root')
     options.add_output(parser, 'file to write (default: standard output)')
 
 
@@ -53,12 +56,16 @@ def _robot_name(catalog: Catalog, args: argparse.Namespace) -> str:
 def _chosen_chains(catalog: Catalog, args: argparse.Namespace) -> tuple[Chain, ...]:
     """Return the chains asked for; if none is, all that have the version asked for."""
     if args.chains:
-        with options.advice_on_chains(catalog):
-            return catalog.select(args.chains, args.version)
+        return catalog.select(args.chains, args.version)
+    options.refuse_no_chains(catalog)
     first = next(iter(catalog.chains))
     version = args.version or catalog.chain(first).version
-    names = [name for name, entry in catalog.chains.items() if version in entry.versions]
+    names = [
+        name for name, entry in catalog.chains.items() if version in entry.versions
+    ]
     if not names:
-        versions = [known for entry in catalog.chains.values() for known in entry.versions]
+        versions = [
+            known for entry in catalog.chains.values() for known in entry.versions
+        ]
         raise UnknownNameError('version', version, dict.fromkeys(versions))
     return catalog.select(names, version)

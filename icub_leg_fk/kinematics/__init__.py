@@ -14,6 +14,17 @@ from icub_leg_fk.kinematics.table_from_urdf import chain_from_urdf
 from icub_leg_fk.kinematics.urdf_file import Urdf
 
 __all__ = [
-    'Catalog', 'Chain', 'ChainEntry', 'DHLink', 'Pose', 'Row', 'TipFrame', 'Twist', 'Urdf',
-    'chain_from_urdf', 'config_file', 'load_chain', 'matrix_to_quaternion',
+    'Catalog',
+    'Chain',
+    'ChainEntry',
+    'DHLink',
+    'Pose',
+    'Row',
+    'TipFrame',
+    'Twist',
+    'Urdf',
+    'chain_from_urdf',
+    'config_file',
+    'load_chain',
+    'matrix_to_quaternion',
 ]

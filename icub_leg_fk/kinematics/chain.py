@@ -12,7 +12,12 @@ from typing import NamedTuple, NoReturn
 from icub_leg_fk.errors import LegFKError, UnknownNameError
 from icub_leg_fk.kinematics import chain_text
 from icub_leg_fk.kinematics.frozen import Frozen
-from icub_leg_fk.kinematics.joint_vector import joint_array, joint_floats, JointVector, too_large
+from icub_leg_fk.kinematics.joint_vector import (
+    joint_array,
+    joint_floats,
+    JointVector,
+    too_large,
+)
 from icub_leg_fk.kinematics.link import CONVENTIONS, DHLink, modified_rows
 from icub_leg_fk.kinematics.rotation import Array, rigid_transform
 from icub_leg_fk.kinematics.solver import Pose, Solver, Twist
@@ -85,7 +90,7 @@ class Chain(Frozen):
         convention: `standard`, or `modified` for a table in Craig's convention.
         root_axes: where x, y and z of the root point, such as backward, right, up; empty if it is
             not known.
-        source: where the table comes from; empty if nothing is said.
+        source: where the table comes from; empty if not given.
     """
 
     name: str
@@ -104,22 +109,32 @@ class Chain(Frozen):
 
     def __post_init__(self) -> None:
         if self.convention not in CONVENTIONS:
-            self._refuse(f'convention is {self.convention!r}; allowed: {", ".join(CONVENTIONS)}')
+            self._refuse(
+                f'convention is {self.convention!r}; allowed: {", ".join(CONVENTIONS)}'
+            )
         if len(set(self.joint_names)) < len(self.joint_names):
-            self._refuse(f'joints are {", ".join(self.joint_names)}; allowed: each joint once')
+            self._refuse(
+                f'joints are {", ".join(self.joint_names)}; allowed: each joint once'
+            )
         _ = self._row_joints  # refuses rows that do not fit the joints
         last = self.links[-1]
         if self.convention == 'modified' and (last.a or last.alpha):
-            self._refuse(f'a and alpha after the last joint are {last.a:g} and {last.alpha:g}; '
-                         'allowed in the modified convention: 0, with T_n_tip instead')
+            self._refuse(
+                f'a and alpha after the last joint are {last.a:g} and {last.alpha:g}; '
+                'allowed in the modified convention: 0, with T_n_tip instead'
+            )
         for name in ('T_root_0', 'T_n_tip'):
-            transform = rigid_transform(getattr(self, name), f'{name} of chain {self.name}')
+            transform = rigid_transform(
+                getattr(self, name), f'{name} of chain {self.name}'
+            )
             object.__setattr__(self, name, transform)
         frames = dict(self.tip_frames) or {self.tip: TipFrame(self.tip)}
         object.__setattr__(self, 'tip_frames', frames)
         object.__setattr__(self, 'frame', self.frame or next(iter(frames)))
         if self.frame not in frames:
-            raise UnknownNameError(f'tip frame of chain {self.name}', self.frame, frames)
+            raise UnknownNameError(
+                'tip frame', self.frame, frames, of=f'chain {self.name}'
+            )
         super().__post_init__()
 
     @property
@@ -140,12 +155,12 @@ class Chain(Frozen):
 
     @cached_property
     def lower(self) -> Array:
-        """(n,) smallest joint positions [rad or m]: the robots' if known, else as printed."""
+        """(n,) smallest joint positions [rad or m]; the robots' if known, else as printed."""
         return _read_only([link.limits[0] for link in self.joints])
 
     @cached_property
     def upper(self) -> Array:
-        """(n,) largest joint positions [rad or m]: the robots' if known, else as printed."""
+        """(n,) largest joint positions [rad or m]; the robots' if known, else as printed."""
         return _read_only([link.limits[1] for link in self.joints])
 
     def rows(self) -> tuple[Row, ...]:
@@ -172,7 +187,7 @@ class Chain(Frozen):
             (..., 4, 4) transforms.
 
         Raises:
-            JointVectorError: q is not (..., n), an entry is no finite number, or a joint is
+            JointVectorError: q is not (..., n), an entry is not finite, or a joint is
                 missing.
         """
         positions = joint_array(q, self.joint_names)
@@ -192,7 +207,7 @@ class Chain(Frozen):
             (..., m + 2, 4, 4): frame 0, a frame for each of the m rows, and the tip's.
 
         Raises:
-            JointVectorError: q is not (..., n), an entry is no finite number, or a joint is
+            JointVectorError: q is not (..., n), an entry is not finite, or a joint is
                 missing.
         """
         positions = joint_array(q, self.joint_names)
@@ -230,7 +245,7 @@ class Chain(Frozen):
                 fastest.
 
         Raises:
-            JointVectorError: q has not n entries, or one is no finite number, or a joint is
+            JointVectorError: q has not n entries, or one is not finite, or a joint is
                 missing.
         """
         try:
@@ -253,7 +268,7 @@ class Chain(Frozen):
             (N, 7) rows x, y, z [m], qx, qy, qz, qw.
 
         Raises:
-            JointVectorError: Q is not (N, n), an entry is no finite number, or a joint is
+            JointVectorError: Q is not (N, n), an entry is not finite, or a joint is
                 missing.
         """
         return _finite(self._solver.poses(joint_array(Q, self.joint_names, 2)))
@@ -273,7 +288,7 @@ class Chain(Frozen):
             of joint velocity.
 
         Raises:
-            JointVectorError: q has not n entries, or one is no finite number, or a joint is
+            JointVectorError: q has not n entries, or one is not finite, or a joint is
                 missing.
         """
         positions = joint_array(q, self.joint_names, 1)
@@ -300,12 +315,14 @@ class Chain(Frozen):
             qdot: (n,) joint velocities [rad/s or m/s]; likewise.
 
         Raises:
-            JointVectorError: q or qdot has not n entries, or one is no finite number, or a joint
+            JointVectorError: q or qdot has not n entries, or one is not finite, or a joint
                 is missing.
         """
         try:
             positions = joint_floats(q, self.joint_names)
-            twist = self._solver.twist(positions, joint_floats(qdot, self.joint_names, 'qdot'))
+            twist = self._solver.twist(
+                positions, joint_floats(qdot, self.joint_names, 'qdot')
+            )
         except (ArithmeticError, TypeError, ValueError) as error:
             joint_array(q, self.joint_names, 1)
             self._refuse_vector(qdot, 'qdot', error)
@@ -321,7 +338,7 @@ class Chain(Frozen):
             q: (n,) joint positions [rad or m], or a mapping from joint names.
 
         Raises:
-            JointVectorError: q has not n entries, or one is no finite number, or a joint is
+            JointVectorError: q has not n entries, or one is not finite, or a joint is
                 missing.
         """
         positions = joint_array(q, self.joint_names, 1)
@@ -340,7 +357,9 @@ class Chain(Frozen):
                 row_joints.append(-1)
             elif link.joint:
                 if link.joint not in names:
-                    raise UnknownNameError(f'joint of chain {self.name}', link.joint, names)
+                    raise UnknownNameError(
+                        'joint', link.joint, names, of=f'chain {self.name}'
+                    )
                 row_joints.append(names.index(link.joint))
             elif unnamed:
                 row_joints.append(unnamed.popleft())
@@ -360,7 +379,8 @@ class Chain(Frozen):
         links, joints = self.links, self._row_joints
         if self.convention == 'modified':
             links = modified_rows(self.links)
-            joints = joints[len(joints) - len(links):]
+            first = len(joints) - len(links)
+            joints = joints[first:]
         rows = []
         for index, (link, joint) in enumerate(zip(links, joints, strict=True)):
             name = '' if link.is_fixed else self.joint_names[joint]
@@ -386,29 +406,36 @@ class Chain(Frozen):
     @cached_property
     def _solver(self) -> Solver:
         R_zero = self.forward(np.zeros(self.n))[:3, :3]
-        return Solver(self.links, self._row_joints, self.T_root_0, self._T_n_frame, R_zero)
+        return Solver(
+            self.links, self._row_joints, self.T_root_0, self._T_n_frame, R_zero
+        )
 
     def _T_root_0_for(self, positions: Array) -> Array:
         return np.broadcast_to(self.T_root_0, (*positions.shape[:-1], 4, 4))
 
-    def _refuse_vector(self, q: JointVector, name: str, error: Exception | None = None
-                       ) -> NoReturn:
+    def _refuse_vector(
+        self, q: JointVector, name: str, error: Exception | None = None
+    ) -> NoReturn:
         """Raise the error that says what is wrong with a vector that gave no finite result."""
         joint_array(q, self.joint_names, 1, name)
         raise too_large(name) from error
 
     def _refuse_joints(self) -> NoReturn:
         moving = sum(not link.is_fixed for link in self.links)
-        self._refuse(f'{len(self.joint_names)} joint names for {moving} rows with a joint; '
-                     'allowed: at least one joint, and at least one row for each')
+        self._refuse(
+            f'{len(self.joint_names)} joint names for {moving} rows with a joint; '
+            'allowed: at least one joint, and at least one row for each'
+        )
 
     def _refuse(self, fault: str) -> NoReturn:
         raise LegFKError(f'chain {self.name}: {fault}')
 
     def __repr__(self) -> str:
         joints = 'joint' if self.n == 1 else 'joints'
-        return (f'<Chain {self.name[:20]} {self.version[:10]}: {self.n} {joints}, '
-                f'{self.root_frame[:20]} to {self.frame_id[:20]}>')
+        return (
+            f'<Chain {self.name[:20]} {self.version[:10]}: {self.n} {joints}, '
+            f'{self.root_frame[:20]} to {self.frame_id[:20]}>'
+        )
 
     def __str__(self) -> str:
         return chain_text.as_text(self)

@@ -16,7 +16,7 @@ HEADER = ('i', 'joint', 'a', 'd', 'alpha', 'theta', 'range')
 
 
 def short(value: float, decimals: int = 4) -> str:
-    """Return a number with at most so many decimals: 0.5, -1, 17.3205; never -0."""
+    """Return a rounded number without zeros at its end: 0.5, -1, 17.3205; never -0."""
     text = f'{round(value, decimals) + 0.0:.{decimals}f}'
     return text.rstrip('0').rstrip('.') if '.' in text else text
 
@@ -48,8 +48,17 @@ def table_rows(chain: Chain) -> list[tuple[str, ...]]:
         elif not link.is_fixed:
             theta = f'{theta} {_motion(link)}'
         bounds = joint_range(link) if row.is_first else ''
-        rows.append((str(index), row.joint or '(fixed)', short(1000 * link.a, 6), d,
-                     short(math.degrees(link.alpha), 6), theta, bounds))
+        rows.append(
+            (
+                str(index),
+                row.joint or '(fixed)',
+                short(1000 * link.a, 6),
+                d,
+                short(math.degrees(link.alpha), 6),
+                theta,
+                bounds,
+            )
+        )
     return rows
 
 
@@ -66,14 +75,20 @@ def as_text(chain: Chain) -> str:
 
 def as_html(chain: Chain) -> str:
     """Return the table as a notebook shows it."""
-    lines = ['<table>', f'<caption>{escape(_title(chain))}</caption>', _html_row('th', HEADER)]
+    lines = [
+        '<table>',
+        f'<caption>{escape(_title(chain))}</caption>',
+        _html_row('th', HEADER),
+    ]
     lines += [_html_row('td', cells) for cells in table_rows(chain)]
     return '\n'.join([*lines, '</table>'])
 
 
 def _title(chain: Chain) -> str:
-    return (f'{chain.name} {chain.version}: {chain.root_frame} to {chain.frame_id}, '
-            f'{chain.convention} Denavit-Hartenberg table in mm, deg')
+    return (
+        f'{chain.name} {chain.version}: {chain.root_frame} to {chain.frame_id}, '
+        f'{chain.convention} Denavit-Hartenberg table in mm, deg'
+    )
 
 
 def _motion(link: DHLink) -> str:
@@ -84,4 +99,6 @@ def _motion(link: DHLink) -> str:
 
 
 def _html_row(tag: str, cells: Sequence[str]) -> str:
-    return '<tr>' + ''.join(f'<{tag}>{escape(cell)}</{tag}>' for cell in cells) + '</tr>'
+    return (
+        '<tr>' + ''.join(f'<{tag}>{escape(cell)}</{tag}>' for cell in cells) + '</tr>'
+    )

@@ -42,8 +42,9 @@ class Difference(NamedTuple):
     mean_deg: float
 
 
-def postures(chain: Chain, count: int, reach: float = math.pi, *, whole_range: bool = True
-             ) -> dict[str, Array]:
+def postures(
+    chain: Chain, count: int, reach: float = math.pi, *, whole_range: bool = True
+) -> dict[str, Array]:
     """Return seeded random joint positions, the same at every call.
 
     Args:
@@ -59,13 +60,17 @@ def postures(chain: Chain, count: int, reach: float = math.pi, *, whole_range: b
     lower, upper = np.full(chain.n, -reach), np.full(chain.n, reach)
     if whole_range:
         lower = np.where(np.isfinite(chain.lower), chain.lower, lower)
-        upper = np.where(np.isfinite(chain.upper), chain.upper, np.maximum(upper, lower))
+        upper = np.where(
+            np.isfinite(chain.upper), chain.upper, np.maximum(upper, lower)
+        )
         lower = np.minimum(lower, upper)
     Q = np.random.default_rng(_SEED).uniform(lower, upper, (count, chain.n))
     return dict(zip(chain.joint_names, Q.T, strict=True))
 
 
-def difference(one: Forward, other: Forward, positions: Mapping[str, Array]) -> Difference:
+def difference(
+    one: Forward, other: Forward, positions: Mapping[str, Array]
+) -> Difference:
     """Return how far two chains are apart.
 
     Args:
@@ -80,7 +85,9 @@ def distance(one: Array, other: Array) -> Difference:
     """Return how far (N, 4, 4) transforms are from others."""
     mm = 1000 * np.linalg.norm(one[:, :3, 3] - other[:, :3, 3], axis=1)
     deg = np.degrees(angle_between(one[:, :3, :3], other[:, :3, :3]))
-    return Difference(float(mm.max()), float(mm.mean()), float(deg.max()), float(deg.mean()))
+    return Difference(
+        float(mm.max()), float(mm.mean()), float(deg.max()), float(deg.mean())
+    )
 
 
 def turn_of_axes(ours: Array, theirs: Array) -> Array:
@@ -137,7 +144,7 @@ def fit(ours: Array, theirs: Array) -> tuple[Array, Array]:
     for _ in range(_MOST_STEPS):
         T = X @ ours @ Y
         error = _error(T, theirs)
-        size = float((error ** 2).sum())
+        size = float((error**2).sum())
         if size >= least:
             break
         best, least = (X, Y), size
@@ -156,7 +163,8 @@ def _start_of_fit(ours: Array, theirs: Array) -> tuple[Array, Array]:
     # p_theirs = R_X (p_ours + R_ours t_Y) + t_X
     R_X = X[:3, :3]
     columns = np.concatenate(
-        (np.broadcast_to(np.eye(3), (len(ours), 3, 3)), R_X @ ours[:, :3, :3]), axis=2)
+        (np.broadcast_to(np.eye(3), (len(ours), 3, 3)), R_X @ ours[:, :3, :3]), axis=2
+    )
     rest = theirs[:, :3, 3] - ours[:, :3, 3] @ R_X.T
     t = _least_squares(columns.reshape(-1, 6), rest.ravel())
     X[:3, 3], Y[:3, 3] = t[:3], t[3:]
@@ -181,7 +189,9 @@ def _kabsch(ours: Array, theirs: Array) -> Array:
 
 
 def _mean_rotation(ours: Array, theirs: Array) -> Array:
-    return np.asarray((np.swapaxes(ours[:, :3, :3], 1, 2) @ theirs[:, :3, :3]).mean(axis=0))
+    return np.asarray(
+        (np.swapaxes(ours[:, :3, :3], 1, 2) @ theirs[:, :3, :3]).mean(axis=0)
+    )
 
 
 def _least_squares(A: Array, b: Array) -> Array:

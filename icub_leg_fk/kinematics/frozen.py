@@ -22,7 +22,9 @@ class Frozen:
             object.__setattr__(self, field.name, _read_only(getattr(self, field.name)))
 
     def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
-        return type(self), tuple(_picklable(getattr(self, field.name)) for field in fields(self))
+        return type(self), tuple(
+            _picklable(getattr(self, field.name)) for field in fields(self)
+        )
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, type(self)):
@@ -33,8 +35,11 @@ class Frozen:
         return hash(self._key())
 
     def _key(self) -> Hashable:
-        return tuple(_hashable(getattr(self, field.name))
-                     for field in fields(self) if field.compare)
+        return tuple(
+            _hashable(getattr(self, field.name))
+            for field in fields(self)
+            if field.compare
+        )
 
 
 def _read_only(value: Any) -> Any:
@@ -42,7 +47,7 @@ def _read_only(value: Any) -> Any:
         array = np.array(value, dtype=float)
         array.flags.writeable = False
         return array
-    if isinstance(value, Mapping):
+    if isinstance(value, (dict, MappingProxyType)):
         return MappingProxyType(dict(value))
     if isinstance(value, list):
         return tuple(value)
@@ -50,12 +55,15 @@ def _read_only(value: Any) -> Any:
 
 
 def _picklable(value: Any) -> Any:
-    return dict(value) if isinstance(value, Mapping) else value
+    return dict(value) if isinstance(value, MappingProxyType) else value
 
 
 def _hashable(value: Any) -> Hashable:
     if isinstance(value, np.ndarray):
-        return (value.shape, *value.ravel().tolist())  # equal floats have equal hashes, -0.0 too
+        return (
+            value.shape,
+            *value.ravel().tolist(),
+        )  # equal floats have equal hashes, -0.0 too
     if isinstance(value, Mapping):
         return tuple(value.items())
     return value  # type: ignore[no-any-return]

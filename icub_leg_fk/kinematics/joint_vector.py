@@ -12,10 +12,13 @@ from numpy.typing import ArrayLike
 
 JointVector = Sequence[float] | Mapping[str, float] | Array
 
+_KINDS = {'U': 'text', 'S': 'bytes', 'O': 'objects', 'c': 'complex numbers'}
 _SHAPES = {1: '({n},)', 2: '(N, {n})', None: '(..., {n})'}
 
 
-def joint_floats(q: JointVector, joint_names: Sequence[str], name: str = 'q') -> Sequence[float]:
+def joint_floats(
+    q: JointVector, joint_names: Sequence[str], name: str = 'q'
+) -> Sequence[float]:
     """Return one joint vector as n floats, fast; whether they are finite is not looked at.
 
     Args:
@@ -25,7 +28,7 @@ def joint_floats(q: JointVector, joint_names: Sequence[str], name: str = 'q') ->
 
     Raises:
         JointVectorError: q has not n entries, or lacks a joint.
-        ArithmeticError, TypeError, ValueError: an entry of a list or tuple is no number;
+        ArithmeticError, TypeError, ValueError: an entry of a list or tuple is not a number;
             `joint_array` says which.
     """
     if type(q) is list or type(q) is tuple:
@@ -34,8 +37,12 @@ def joint_floats(q: JointVector, joint_names: Sequence[str], name: str = 'q') ->
     return joint_array(q, joint_names, 1, name).tolist()  # type: ignore[no-any-return]
 
 
-def joint_array(q: ArrayLike | Mapping[str, ArrayLike], joint_names: Sequence[str],
-                ndim: int | None = None, name: str = 'q') -> Array:
+def joint_array(
+    q: ArrayLike | Mapping[str, ArrayLike],
+    joint_names: Sequence[str],
+    ndim: int | None = None,
+    name: str = 'q',
+) -> Array:
     """Return joint vectors in float64.
 
     Args:
@@ -45,7 +52,7 @@ def joint_array(q: ArrayLike | Mapping[str, ArrayLike], joint_names: Sequence[st
         name: what q is called in an error.
 
     Raises:
-        JointVectorError: q has another shape, lacks a joint, or an entry is no finite number.
+        JointVectorError: q has another shape, lacks a joint, or an entry is not finite.
     """
     n = len(joint_names)
     allowed = f'{_SHAPES[ndim].format(n=n)} finite real numbers, one per joint'
@@ -63,15 +70,21 @@ def joint_array(q: ArrayLike | Mapping[str, ArrayLike], joint_names: Sequence[st
 
 def too_large(name: str) -> JointVectorError:
     """Return the error for a vector of finite numbers that gives no finite result."""
-    return JointVectorError(name, 'has values too large to compute with', 'finite numbers')
+    return JointVectorError(
+        name, 'has values too large to compute with', 'finite numbers'
+    )
 
 
-def _in_order(q: Mapping[str, ArrayLike], joint_names: Sequence[str], name: str
-              ) -> list[Any]:
+def _in_order(
+    q: Mapping[str, ArrayLike], joint_names: Sequence[str], name: str
+) -> list[Any]:
     missing = [joint for joint in joint_names if joint not in q]
     if missing:
-        raise JointVectorError(name, f'lacks {", ".join(missing)}',
-                               f'a mapping with all of {", ".join(joint_names)}')
+        raise JointVectorError(
+            name,
+            f'lacks {", ".join(missing)}',
+            f'a mapping with all of {", ".join(joint_names)}',
+        )
     return [q[joint] for joint in joint_names]
 
 
@@ -80,22 +93,34 @@ def _values(q: ArrayLike, name: str, allowed: str) -> Array:
     try:
         values = np.asarray(q)
     except (OverflowError, TypeError, ValueError) as error:
-        fault = f'is not an array of numbers ({error})'
+        fault = (
+            f'is {_type_in_words(q)} whose parts differ in length, or are not numbers'
+        )
         raise JointVectorError(name, fault, allowed) from error
-    is_masked = type(q).__module__.startswith('numpy.ma')  # whose import takes a start 7 ms
+    is_masked = type(q).__module__.startswith(
+        'numpy.ma'
+    )  # whose import takes a start 7 ms
     is_number = values.dtype.kind in 'biuf' or not values.size
     if isinstance(q, (str, bytes)) or is_masked or not is_number:
-        found = type(q).__name__
+        found = _type_in_words(q)
         if values.ndim:
-            found += f' of {values.dtype.name}'
-        raise JointVectorError(name, f'is a {found}', allowed)
+            found += f' of {_KINDS.get(values.dtype.kind, values.dtype.name)}'
+        raise JointVectorError(name, f'is {found}', allowed)
     with np.errstate(over='ignore'):
         return values.astype(float, copy=False)
 
 
+def _type_in_words(q: object) -> str:
+    if q is None:
+        return 'None'
+    return 'an array' if isinstance(q, np.ndarray) else f'a {type(q).__name__}'
+
+
 def _refuse_not_finite(values: Array, name: str) -> None:
     with np.errstate(all='ignore'):
-        is_finite = math.isfinite(values.sum())  # a mask as large as the values only if needed
+        is_finite = math.isfinite(
+            values.sum()
+        )  # a mask as large as the values only if needed
     if is_finite or np.isfinite(values).all():
         return
     index = tuple(np.argwhere(~np.isfinite(values))[0].tolist())

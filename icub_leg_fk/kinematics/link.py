@@ -51,10 +51,13 @@ class DHLink:
 
     def __post_init__(self) -> None:
         if self.joint_type not in JOINT_TYPES:
-            raise LegFKError(f'joint_type is {self.joint_type!r}; allowed: '
-                             f'{", ".join(JOINT_TYPES)}')
+            raise LegFKError(
+                f'joint_type is {self.joint_type!r}; allowed: {", ".join(JOINT_TYPES)}'
+            )
         for name in ('a', 'd', 'alpha', 'offset', 'gain'):
-            value = float(getattr(self, name))  # numpy's own scalars are slow in arithmetic
+            value = float(
+                getattr(self, name)
+            )  # numpy's own scalars are slow in arithmetic
             if not math.isfinite(value):
                 raise LegFKError(f'{name} is {value}; allowed: a finite number')
             object.__setattr__(self, name, value)
@@ -64,7 +67,9 @@ class DHLink:
             raise LegFKError(f'joint of a fixed row is {self.joint!r}; allowed: none')
         for lower, upper in ((self.lower, self.upper), self.limits):
             if not lower <= upper:
-                raise LegFKError(f'range is {lower} .. {upper}; allowed: lower <= upper')
+                raise LegFKError(
+                    f'range is {lower} .. {upper}; allowed: lower <= upper'
+                )
 
     @property
     def is_prismatic(self) -> bool:
@@ -126,7 +131,10 @@ class DHLink:
         return np.array([[1, 0, 0, self.a], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1]])
 
     def __repr__(self) -> str:
-        words = [f'{name}={getattr(self, name):.5g}' for name in ('a', 'd', 'alpha', 'offset')]
+        words = [
+            f'{name}={getattr(self, name):.5g}'
+            for name in ('a', 'd', 'alpha', 'offset')
+        ]
         if self.joint_type != 'revolute':
             words.append(self.joint_type)
         if self.gain != 1.0:
@@ -141,7 +149,7 @@ def standard_rows(rows: Sequence[DHLink]) -> tuple[DHLink, ...]:
 
     There A_i = Rx(alpha) Tx(a) Rz(theta) Tz(d), with a and alpha before the joint instead of
     after it. So each standard row takes them from the next one, and those of the first become a
-    fixed row of their own, if they are not 0.
+    fixed row that has only them, if they are not 0.
     """
     links = []
     for row, following in zip(rows, [*rows[1:], None], strict=True):

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 _ROUNDING = 2e-15  # what cosine and sine may be off at right angles within two turns
+_EXACT = 1e-15  # below it an entry of a rotation matrix is 0 but for rounding
 _LIKELY = 1e-6  # components of a unit quaternion that differ by less may be equal but for rounding
 
 
@@ -48,16 +49,31 @@ def matrix_to_quaternion(rotation: ArrayLike) -> Array:
     wy = R[..., 0, 2] - R[..., 2, 0]
     wz = R[..., 1, 0] - R[..., 0, 1]
     # 4 q q^T: row k is the quaternion times four times its own component k.
-    outer = np.stack([
-        np.stack([1 + r00 - r11 - r22, xy, xz, wx], axis=-1),
-        np.stack([xy, 1 - r00 + r11 - r22, yz, wy], axis=-1),
-        np.stack([xz, yz, 1 - r00 - r11 + r22, wz], axis=-1),
-        np.stack([wx, wy, wz, 1 + r00 + r11 + r22], axis=-1),
-    ], axis=-2)
+    outer = np.stack(
+        [
+            np.stack([1 + r00 - r11 - r22, xy, xz, wx], axis=-1),
+            np.stack([xy, 1 - r00 + r11 - r22, yz, wy], axis=-1),
+            np.stack([xz, yz, 1 - r00 - r11 + r22, wz], axis=-1),
+            np.stack([wx, wy, wz, 1 + r00 + r11 + r22], axis=-1),
+        ],
+        axis=-2,
+    )
     largest = np.argmax(np.diagonal(outer, axis1=-2, axis2=-1), axis=-1)
     q = np.take_along_axis(outer, largest[..., None, None], axis=-2)[..., 0, :]
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
     return np.asarray(np.where(q[..., 3:] < 0, -q, q) + 0.0)
+
+
+def quaternion_to_matrix(quaternion: ArrayLike) -> Array:
+    """Return the (3, 3) rotation of a (4,) unit quaternion x, y, z, w."""
+    x, y, z, w = np.asarray(quaternion, dtype=float).tolist()
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def reference_quaternion(quaternion: ArrayLike) -> Array:
@@ -85,6 +101,20 @@ def turns_about(axis: Array, angle: ArrayLike) -> Array:
     return np.asarray(np.eye(3) + sin * K + (1 - cos) * (K @ K))
 
 
+def roll_pitch_yaw(R: Array) -> Array:
+    """Return the (3,) angles [rad] of a (3, 3) rotation Rz(yaw) Ry(pitch) Rx(roll), as in URDF.
+
+    The yaw is taken out before the other two angles are read off, so they are as accurate at
+    pitch = pi/2, where any yaw would do and 0 is taken, as elsewhere.
+    """
+    is_upright = math.hypot(R[0, 0], R[1, 0]) < _EXACT
+    yaw = 0.0 if is_upright else math.atan2(R[1, 0], R[0, 0])
+    c, s = math.cos(yaw), math.sin(yaw)
+    pitch = math.atan2(-R[2, 0], c * R[0, 0] + s * R[1, 0])
+    roll = math.atan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
+    return np.array([roll, pitch, yaw])
+
+
 def angle_between(one: Array, two: Array) -> Array:
     """Return the (...) angles [rad] between (..., 3, 3) rotations, exact also where small."""
     # |R1 - R2| is 2 sqrt(2) sin(angle / 2).
@@ -108,8 +138,10 @@ def rigid_transform(T: ArrayLike, name: str) -> Array:
         matrix = np.empty(0)
     if not is_rigid_transform(matrix):
         found = reprlib.repr(' '.join(str(T).split()))
-        raise LegFKError(f'{name} is {found}; allowed: a (4, 4) rotation and translation with '
-                         'the last row 0 0 0 1')
+        raise LegFKError(
+            f'{name} is {found}; allowed: a (4, 4) rotation and translation with '
+            'the last row 0 0 0 1'
+        )
     matrix[:3, :3] = nearest_rotation(matrix[:3, :3])
     return matrix
 
@@ -127,7 +159,9 @@ def is_rigid_transform(T: Array, tolerance: float = 1e-6) -> bool:
     if np.abs(R).max() >= 2.0:  # larger ones may overflow below
         return False
     is_orthogonal = np.allclose(R @ R.T, np.eye(3), atol=tolerance)
-    return bool(is_orthogonal and np.linalg.det(R) > 0 and np.array_equal(T[3], (0, 0, 0, 1)))
+    return bool(
+        is_orthogonal and np.linalg.det(R) > 0 and np.array_equal(T[3], (0, 0, 0, 1))
+    )
 
 
 def nearest_rotation(R: Array) -> Array:

@@ -85,8 +85,8 @@ def _short_repr(numbers: Pose | Twist) -> str:
 class Solver:
     """Position, unit quaternion and velocity of a chain's tip in its root frame.
 
-    Joint vectors are taken as they are: what is no finite number gives no finite result, or the
-    ValueError of `math.cos`.
+    Joint vectors are taken as they are: what is not finite gives a result that is not finite, or
+    the ValueError of `math.cos`.
 
     Args:
         links: m rows, root to tip.
@@ -96,15 +96,30 @@ class Solver:
         R_zero: (3, 3) orientation of the tip at q = 0, which decides the quaternions' sign.
     """
 
-    def __init__(self, links: Sequence[DHLink], joints: Sequence[int], T_root_0: Array,
-                 T_n_tip: Array, R_zero: Array) -> None:
-        rows = [tuple(_row(link, joint)) for link, joint in zip(links, joints, strict=True)]
-        self._rows: list[Any] = rows[::-1]  # plain tuples, which unpack faster than named ones
-        self._start = (*T_n_tip[:3, 3].tolist(), *matrix_to_quaternion(T_n_tip[:3, :3]).tolist())
+    def __init__(
+        self,
+        links: Sequence[DHLink],
+        joints: Sequence[int],
+        T_root_0: Array,
+        T_n_tip: Array,
+        R_zero: Array,
+    ) -> None:
+        rows = [
+            tuple(_row(link, joint)) for link, joint in zip(links, joints, strict=True)
+        ]
+        self._rows: list[Any] = rows[
+            ::-1
+        ]  # plain tuples, which unpack faster than named ones
+        self._start = (
+            *T_n_tip[:3, 3].tolist(),
+            *matrix_to_quaternion(T_n_tip[:3, :3]).tolist(),
+        )
         self._R_root = tuple(T_root_0[:3, :3].ravel().tolist())
         self._t_root = tuple(T_root_0[:3, 3].tolist())
         self._q_root = tuple(matrix_to_quaternion(T_root_0[:3, :3]).tolist())
-        self._reference = tuple(reference_quaternion(matrix_to_quaternion(R_zero)).tolist())
+        self._reference = tuple(
+            reference_quaternion(matrix_to_quaternion(R_zero)).tolist()
+        )
 
     def pose(self, q: Sequence[float]) -> Pose:
         """Return the pose for one joint vector of n floats [rad or m]."""
@@ -112,7 +127,9 @@ class Solver:
         rx, ry, rz, rw = self._reference
         # Adding to 0.0 or taking from it leaves no negative zero.
         if rx * qx + ry * qy + rz * qz + rw * qw >= 0.0:
-            return Pose(0.0 + x, 0.0 + y, 0.0 + z, 0.0 + qx, 0.0 + qy, 0.0 + qz, 0.0 + qw)
+            return Pose(
+                0.0 + x, 0.0 + y, 0.0 + z, 0.0 + qx, 0.0 + qy, 0.0 + qz, 0.0 + qw
+            )
         return Pose(0.0 + x, 0.0 + y, 0.0 + z, 0.0 - qx, 0.0 - qy, 0.0 - qz, 0.0 - qw)
 
     def poses(self, Q: Array) -> Array:
@@ -133,8 +150,12 @@ class Solver:
         poses[3:, is_other] *= -1.0
         return poses + 0.0
 
-    def _tip(self, q: Any, cos: Callable[[Numbers], Numbers],
-             sin: Callable[[Numbers], Numbers]) -> tuple[Numbers, ...]:
+    def _tip(
+        self,
+        q: Any,
+        cos: Callable[[Numbers], Numbers],
+        sin: Callable[[Numbers], Numbers],
+    ) -> tuple[Numbers, ...]:
         """Return x, y, z, qx, qy, qz, qw for n joint positions, which are floats or arrays."""
         x, y, z, qx, qy, qz, qw = self._start
         for theta, d, a, ca, sa, ch, sh, joint, turn_gain, slide_gain in self._rows:
@@ -156,19 +177,29 @@ class Solver:
             x, y = c * x - s * y, s * x + c * y
         return self._in_root(x, y, z, qx, qy, qz, qw)
 
-    def _in_root(self, x: Numbers, y: Numbers, z: Numbers, qx: Numbers, qy: Numbers, qz: Numbers,
-                 qw: Numbers) -> tuple[Numbers, ...]:
+    def _in_root(
+        self,
+        x: Numbers,
+        y: Numbers,
+        z: Numbers,
+        qx: Numbers,
+        qy: Numbers,
+        qz: Numbers,
+        qw: Numbers,
+    ) -> tuple[Numbers, ...]:
         """Return a pose in frame 0 as one in the root frame."""
         r00, r01, r02, r10, r11, r12, r20, r21, r22 = self._R_root
         tx, ty, tz = self._t_root
         ax, ay, az, aw = self._q_root
-        return (r00 * x + r01 * y + r02 * z + tx,
-                r10 * x + r11 * y + r12 * z + ty,
-                r20 * x + r21 * y + r22 * z + tz,
-                aw * qx + ax * qw + ay * qz - az * qy,
-                aw * qy - ax * qz + ay * qw + az * qx,
-                aw * qz + ax * qy - ay * qx + az * qw,
-                aw * qw - ax * qx - ay * qy - az * qz)
+        return (
+            r00 * x + r01 * y + r02 * z + tx,
+            r10 * x + r11 * y + r12 * z + ty,
+            r20 * x + r21 * y + r22 * z + tz,
+            aw * qx + ax * qw + ay * qz - az * qy,
+            aw * qy - ax * qz + ay * qw + az * qx,
+            aw * qz + ax * qy - ay * qx + az * qw,
+            aw * qw - ax * qx - ay * qy - az * qz,
+        )
 
     def twist(self, q: Sequence[float], qdot: Sequence[float]) -> Twist:
         """Return the twist for n joint positions [rad or m] and their velocities.
@@ -203,12 +234,14 @@ class Solver:
                 z = z + slide_gain * q[joint]
                 vz = vz + slide_gain * qdot[joint]
         r00, r01, r02, r10, r11, r12, r20, r21, r22 = self._R_root
-        return Twist(0.0 + (r00 * vx + r01 * vy + r02 * vz),
-                     0.0 + (r10 * vx + r11 * vy + r12 * vz),
-                     0.0 + (r20 * vx + r21 * vy + r22 * vz),
-                     0.0 + (r00 * wx + r01 * wy + r02 * wz),
-                     0.0 + (r10 * wx + r11 * wy + r12 * wz),
-                     0.0 + (r20 * wx + r21 * wy + r22 * wz))
+        return Twist(
+            0.0 + (r00 * vx + r01 * vy + r02 * vz),
+            0.0 + (r10 * vx + r11 * vy + r12 * vz),
+            0.0 + (r20 * vx + r21 * vy + r22 * vz),
+            0.0 + (r00 * wx + r01 * wy + r02 * wz),
+            0.0 + (r10 * wx + r11 * wy + r12 * wz),
+            0.0 + (r20 * wx + r21 * wy + r22 * wz),
+        )
 
 
 def _row(link: DHLink, joint: int) -> _Row:
@@ -216,7 +249,14 @@ def _row(link: DHLink, joint: int) -> _Row:
     cos_alpha, sin_alpha = cos_sin(link.alpha)
     cos_half_alpha, sin_half_alpha = cos_sin(link.alpha / 2)
     return _Row(
-        link.offset, link.d, link.a, float(cos_alpha), float(sin_alpha), float(cos_half_alpha),
-        float(sin_half_alpha), joint,
+        link.offset,
+        link.d,
+        link.a,
+        float(cos_alpha),
+        float(sin_alpha),
+        float(cos_half_alpha),
+        float(sin_half_alpha),
+        joint,
         turn_gain=link.gain if link.joint_type == 'revolute' else 0.0,
-        slide_gain=link.gain if link.joint_type == 'prismatic' else 0.0)
+        slide_gain=link.gain if link.joint_type == 'prismatic' else 0.0,
+    )

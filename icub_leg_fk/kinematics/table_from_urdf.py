@@ -2,14 +2,16 @@
 
 Steps 1 to 4 of the method place the frames (z axes along the joints, origins by the common
 normals, x axes along them, y axes by the right hand), step 5 reads the table off them, step 6, the
-product, is `Chain`. What is before the first joint becomes T_Ro0, what is after the last
-frame T_nIs, so nothing of the URDF is lost.
+product, is `Chain`. What is before the first joint becomes T_Ro0, what is after the last frame
+T_nIs, so nothing of the URDF is lost.
 
 Where the method leaves a choice it is made in this order: d = 0, angles that are multiples of 90
-degrees, a >= 0. Axes that a URDF's rounding has made almost parallel are taken as parallel; those
-that truly are a little apart, whose common normal is far away, get a fixed row between them.
+degrees, a >= 0. Axes that are almost parallel, whose common normal is far away, get a fixed row
+between them, so the table is exact and no number is large. For people it is tidied instead: URDFs
+are rounded, and what is almost parallel or almost a right angle was meant to be.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -18,52 +20,65 @@ from pathlib import Path
 import re
 from typing import NamedTuple
 
-from icub_leg_fk.errors import InputFileError, LegFKError
+from icub_leg_fk.errors import InputFileError
 from icub_leg_fk.kinematics.chain import Chain, TipFrame
-from icub_leg_fk.kinematics.link import CONVENTIONS, DHLink
+from icub_leg_fk.kinematics.link import DHLink
 from icub_leg_fk.kinematics.rotation import Array
-from icub_leg_fk.kinematics.urdf_file import MOVING, Urdf
+from icub_leg_fk.kinematics.urdf_file import Urdf
 import numpy as np
 
-PARALLEL = 1e-4  # rad; below it axes are taken as parallel
+VERSION = 'urdf'
+
+TIDY = 1e-4  # rad; a tolerance that tidies the tables of real robots for people
 
 _EXACT = 1e-11  # rad and m; below it a number is rounding
+_SHORT = 1e-8  # m; what is shorter is 0 in a tidied table
 _NEARLY = 0.2  # rad; between axes that are this near a common normal may be far away
-_FAR = 1.0  # m along an axis, beside five times the distance of the joints
+_FAR = 1.0  # m along an axis, added to five times the distance of the joints
 
 
-def chain_from_urdf(urdf: Urdf | str | Path, root: str, tip: str, *, name: str = '',
-                    version: str = 'urdf', convention: str = 'standard',
-                    tolerance: float = PARALLEL) -> Chain:
+def chain_from_urdf(
+    urdf: Urdf, root: str, tip: str, *, tolerance: float = 0.0
+) -> Chain:
     """Return the chain between two links of a URDF, as a Denavit-Hartenberg table.
 
+    Joints that mimic others become rows that follow them.
+
     Args:
-        urdf: path of a URDF, or one that has been read.
+        urdf: the robot.
         root: name of the link to start from.
-        tip: name of a link below it.
-        name: name of the chain; the tip's if empty.
-        version: version of the chain.
-        convention: `standard` or `modified`, in which it prints and is written.
-        tolerance: angle between axes up to which they are taken as parallel [rad].
+        tip: name of a link below it, or one reached by going up over fixed joints first.
+        tolerance: angle up to which axes are taken as parallel, and angles as right ones [rad].
 
     Raises:
-        InputFileError: the file is not a URDF, or these links are not a chain.
+        UnknownNameError: there is no such link; lists those at the ends.
+        InputFileError: these links are not a chain, or a joint cannot be described by a table.
     """
-    if convention not in CONVENTIONS:
-        raise LegFKError(f'convention is {convention!r}; allowed: {", ".join(CONVENTIONS)}')
-    robot = urdf if isinstance(urdf, Urdf) else Urdf.load(urdf)
-    axes, T_end = _axes(robot, root, tip)
+    axes, T_end = _axes(urdf, root, tip)
     frames, links = _frames_and_rows(axes, T_end, tolerance)
-    T_n_tip = _rounded(np.linalg.inv(frames[-1]) @ T_end)
-    if convention == 'modified':  # whose rows have no a and alpha after the last joint
-        last = links[-1]
-        T_n_tip = DHLink(a=last.a, d=0.0, alpha=last.alpha).transform() @ T_n_tip
-        links[-1] = replace(last, a=0.0, alpha=0.0)
+    name = topic_name(tip)
     return Chain(
-        name=name or tip, version=version, root_frame=root, tip=topic_name(name or tip),
-        joint_names=tuple(axis.joint for axis in axes), links=tuple(links),
-        T_root_0=_rounded(frames[0]), tip_frames={topic_name(tip): TipFrame(tip)},
-        T_n_tip=T_n_tip, convention=convention, source=Path(robot.file).name)
+        name=tip,
+        version=VERSION,
+        root_frame=root,
+        tip=name,
+        joint_names=tuple(dict.fromkeys(axis.joint for axis in axes)),
+        links=tuple(_with_joints(links, axes)),
+        T_root_0=_rounded(frames[0]),
+        tip_frames={name: TipFrame(tip)},
+        T_n_tip=_rounded(np.linalg.inv(frames[-1]) @ T_end),
+        source=Path(urdf.file).name,
+    )
+
+
+def as_modified(chain: Chain) -> Chain:
+    """Return a chain in the modified convention, whose rows have no a and alpha after the last."""
+    last = chain.links[-1]
+    after = DHLink(a=last.a, d=0.0, alpha=last.alpha, joint_type='fixed').transform()
+    links = (*chain.links[:-1], replace(last, a=0.0, alpha=0.0))
+    return replace(
+        chain, links=links, T_n_tip=after @ chain.T_n_tip, convention='modified'
+    )
 
 
 def topic_name(name: str) -> str:
@@ -72,9 +87,10 @@ def topic_name(name: str) -> str:
     return word if re.match('[A-Za-z]', word) else f'tip_{word}'
 
 
-def almost_parallel(urdf: Urdf, root: str, tip: str, tolerance: float = PARALLEL
-                    ) -> list[tuple[str, str, float]]:
-    """Return the pairs of joints whose axes `chain_from_urdf` takes as parallel, and their angle.
+def almost_parallel(
+    urdf: Urdf, root: str, tip: str, tolerance: float
+) -> list[tuple[str, str, float]]:
+    """Return the pairs of joints whose axes are taken as parallel, and their angle [rad].
 
     Args:
         urdf: the robot.
@@ -92,49 +108,81 @@ def almost_parallel(urdf: Urdf, root: str, tip: str, tolerance: float = PARALLEL
 
 
 class _Axis(NamedTuple):
-    """Where a joint's axis is at q = 0, in the root link."""
+    """Where a joint's axis is at q = 0, in the root link, and what moves it."""
 
-    joint: str
     kind: str
     direction: Array
     point: Array
+    joint: str
+    gain: float
     lower: float
     upper: float
 
 
-def _axes(robot: Urdf, root: str, tip: str) -> tuple[list[_Axis], Array]:
+def _axes(urdf: Urdf, root: str, tip: str) -> tuple[list[_Axis], Array]:
     """Take step 1, the z axes; return them and T_root_tip at q = 0."""
     T, axes = np.eye(4), []
-    for joint in robot.path(root, tip):
+    for joint in urdf.path(root, tip):
         T = T @ joint.origin
         if joint.moves:
-            direction, point = T[:3, :3] @ joint.axis, T[:3, 3].copy()
-            axes.append(_Axis(joint.name, MOVING[joint.kind], direction, point, joint.lower,
-                              joint.upper))
+            axes.append(
+                _Axis(
+                    joint.kind,
+                    T[:3, :3] @ joint.axis,
+                    T[:3, 3].copy(),
+                    joint.moved_by,
+                    joint.gain,
+                    joint.lower,
+                    joint.upper,
+                )
+            )
+            T = T @ joint.motion(np.array([joint.offset]))[0]
     if not axes:
-        raise InputFileError(robot.file, f'no joint moves between {root!r} and {tip!r}')
+        raise InputFileError(urdf.file, f'no joint moves between {root!r} and {tip!r}')
     return axes, T
 
 
-def _frames_and_rows(axes: Sequence[_Axis], T_end: Array, tolerance: float
-                     ) -> tuple[list[Array], list[DHLink]]:
+def _with_joints(links: Sequence[DHLink], axes: Sequence[_Axis]) -> list[DHLink]:
+    """Return rows moved by their joints: by name if a joint moves several."""
+    rows_of = Counter(axis.joint for axis in axes)
+    remaining = iter(axes)
+    ranged: set[str] = set()
+    rows = []
+    for link in links:
+        if not link.is_fixed:
+            axis = next(remaining)
+            joint = axis.joint if rows_of[axis.joint] > 1 else ''
+            link = replace(link, gain=axis.gain, joint=joint)
+            if axis.joint not in ranged:  # a range stands on the first row of its joint
+                link = replace(link, lower=axis.lower, upper=axis.upper)
+            ranged.add(axis.joint)
+        rows.append(link)
+    return rows
+
+
+def _frames_and_rows(
+    axes: Sequence[_Axis], T_end: Array, tolerance: float
+) -> tuple[list[Array], list[DHLink]]:
     """Place the frames one after the other and read the rows off them (steps 2 to 5)."""
     frames = [_first_frame(axes)]
     links: list[DHLink] = []
     for axis, following in zip(axes, [*axes[1:], None], strict=True):
         if following is None:
-            placed = [_last_frame(frames[-1], T_end)]
+            placed = [_last_frame(frames[-1], T_end, tolerance)]
         else:
             placed = _frames_on(frames[-1], axis, following, tolerance)
         for frame in placed:
-            link = _row(frames[-1], frame, axis if frame is placed[0] else None)
+            kind = axis.kind if frame is placed[0] else 'fixed'
+            link = _row(frames[-1], frame, kind, tolerance)
             links.append(link)
             # After the row as it was read, so that what rounding it has cost does not add up.
             frames.append(frames[-1] @ link.transform())
     return frames, links
 
 
-def _frames_on(frame: Array, axis: _Axis, following: _Axis, tolerance: float) -> list[Array]:
+def _frames_on(
+    frame: Array, axis: _Axis, following: _Axis, tolerance: float
+) -> list[Array]:
     """Return the frame on the next joint's axis, after one across if that axis is awkward."""
     # Of a slide only the direction counts; its line may pass where the frame before it is.
     start, z = frame[:3, 3], following.direction
@@ -148,11 +196,12 @@ def _frames_on(frame: Array, axis: _Axis, following: _Axis, tolerance: float) ->
     return [first, _next_frame(first, z, foot, 0.0)]
 
 
-def _last_frame(frame: Array, T_end: Array) -> Array:
+def _last_frame(frame: Array, T_end: Array, tolerance: float) -> Array:
     """Return the last row's frame: in the tip if it can stand there, else wherever is near."""
     z, point = T_end[:3, 2], T_end[:3, 3]
-    if float(np.linalg.norm(np.cross(frame[:3, 2], z))) < _EXACT:
-        last = _next_frame(frame, z, point, _EXACT)
+    apart = max(tolerance, _EXACT)
+    if float(np.linalg.norm(np.cross(frame[:3, 2], z))) <= apart:
+        last = _next_frame(frame, z, point, apart)
         last[:3, 3] = point
         return last
     reach = _FAR + 5 * float(np.linalg.norm(point - frame[:3, 3]))
@@ -167,7 +216,7 @@ def _first_frame(axes: Sequence[_Axis]) -> Array:
     if len(axes) > 1 and axes[1].kind == axes[0].kind == 'revolute':
         normal = np.cross(z, axes[1].direction)
         sine_squared = float(normal @ normal)
-        if sine_squared > _NEARLY ** 2:
+        if sine_squared > _NEARLY**2:
             moment = np.cross(axes[1].point - origin, axes[1].direction)
             along = float(moment @ normal) / sine_squared
             if abs(along) < _FAR:
@@ -181,15 +230,17 @@ def _foot(start: Array, point: Array, z: Array) -> Array:
     return np.asarray(point + z * (z @ (start - point)))
 
 
-def _is_far(frame: Array, z: Array, point: Array, tolerance: float, reach: float) -> bool:
+def _is_far(
+    frame: Array, z: Array, point: Array, tolerance: float, reach: float
+) -> bool:
     """Return whether the common normal of almost parallel axes is farther away than a reach."""
     z0, start = frame[:3, 2], frame[:3, 3]
     normal = np.cross(z0, z)
     sine = float(np.linalg.norm(normal))
     if not tolerance < sine < _NEARLY:
         return False
-    along = float(np.cross(point - start, z) @ normal) / sine ** 2
-    along_next = float(np.cross(point - start, z0) @ normal) / sine ** 2
+    along = float(np.cross(point - start, z) @ normal) / sine**2
+    along_next = float(np.cross(point - start, z0) @ normal) / sine**2
     is_apart = float(np.linalg.norm(_foot(start, point, z) - start)) > _EXACT
     return is_apart and max(abs(along), abs(along_next)) > reach
 
@@ -207,7 +258,9 @@ def _next_frame(frame: Array, z: Array, point: Array, tolerance: float) -> Array
             return _frame(x0, z, start)
         return _frame(x, z, origin)
     normal /= sine
-    along = float(np.cross(point - start, z0) @ normal) / sine  # from the point to the normal
+    along = (
+        float(np.cross(point - start, z0) @ normal) / sine
+    )  # from the point to the normal
     origin = point + along * z
     a = float((origin - start) @ normal)
     if abs(a) < _EXACT:  # they cross: the x nearer to the one before
@@ -217,26 +270,31 @@ def _next_frame(frame: Array, z: Array, point: Array, tolerance: float) -> Array
     return _frame(-normal if a < 0 else normal, z, origin)
 
 
-def _row(before: Array, after: Array, axis: _Axis | None) -> DHLink:
-    """Read theta, d, a and alpha off two frames (step 5), of a joint or fixed."""
+def _row(before: Array, after: Array, kind: str, tolerance: float) -> DHLink:
+    """Read theta, d, a and alpha off two frames (step 5), tidied if there is a tolerance."""
     T = np.linalg.inv(before) @ after
     theta = math.atan2(T[1, 0], T[0, 0])
     a = math.cos(theta) * T[0, 3] + math.sin(theta) * T[1, 3]
-    row = DHLink(a=_clean_length(a), d=_clean_length(T[2, 3]), joint_type='fixed',
-                 alpha=_clean_angle(math.atan2(T[2, 1], T[2, 2])), offset=_clean_angle(theta))
-    if axis is None:
-        return row
-    return replace(row, joint_type=axis.kind, lower=axis.lower, upper=axis.upper)
+    alpha = math.atan2(T[2, 1], T[2, 2])
+    shortest = _SHORT if tolerance else _EXACT
+    apart = max(tolerance, _EXACT)
+    return DHLink(
+        a=_clean_length(a, shortest),
+        d=_clean_length(T[2, 3], shortest),
+        alpha=_clean_angle(alpha, apart),
+        offset=_clean_angle(theta, apart),
+        joint_type=kind,
+    )
 
 
-def _clean_length(length: float) -> float:
-    return 0.0 if abs(length) < _EXACT else float(length)
+def _clean_length(length: float, shortest: float) -> float:
+    return 0.0 if abs(length) < shortest else float(length)
 
 
-def _clean_angle(angle: float) -> float:
-    """Return an angle, the right one if it is one but for rounding, and pi for -pi."""
+def _clean_angle(angle: float, apart: float) -> float:
+    """Return an angle, the right one if it is apart from it by no more, and pi for -pi."""
     quarters = round(angle / (math.pi / 2))
-    if abs(angle - quarters * math.pi / 2) < _EXACT:
+    if abs(angle - quarters * math.pi / 2) <= apart:
         angle = quarters * math.pi / 2
     return math.pi if angle == -math.pi else float(angle)
 

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 import math
 from pathlib import Path
+import re
+import sys
 from typing import NamedTuple, NoReturn
-from xml.etree import ElementTree as ET
 
-from icub_leg_fk.errors import closest, InputFileError
-from icub_leg_fk.kinematics.rotation import Array, turns_about
+from icub_leg_fk.errors import closest, InputFileError, UnknownNameError
+from icub_leg_fk.kinematics.input_bytes import first_bytes, shown
+from icub_leg_fk.kinematics.rotation import Array, quaternion_to_matrix, turns_about
+from icub_leg_fk.kinematics.urdf_xml import REPLACEMENT, robot_element, tag
+from lxml import etree
 import numpy as np
 
 MOVING = {'revolute': 'revolute', 'continuous': 'revolute', 'prismatic': 'prismatic'}
@@ -18,7 +23,9 @@ MOVING = {'revolute': 'revolute', 'continuous': 'revolute', 'prismatic': 'prisma
 
 _LARGEST_FILE = 50_000_000  # bytes
 _LARGEST = 1e9  # m or rad; what is larger leaves no room to compute with
-_LISTED = 12  # names in an error
+_MOST_ENDS = 24  # names in an error
+_VERSIONS = ('1.0', '1.1', '1.2')
+_NUMBER = re.compile(r'[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?')
 
 
 class JointElement(NamedTuple):
@@ -38,47 +45,61 @@ class JointElement(NamedTuple):
     child: str
     texts: Mapping[tuple[str, str], str]
 
+    def __repr__(self) -> str:
+        return f'<JointElement {self.name[:40]}: {self.kind[:20]}>'
+
 
 class UrdfJoint(NamedTuple):
     """A joint on the way from a root to a tip.
 
+    It is at `gain` times the position of the joint that moves it, plus `offset`.
+
     Attributes:
         name: name of the joint.
-        kind: its type: `revolute`, `continuous`, `prismatic` or `fixed`.
-        origin: (4, 4) transform from the link after it to the link before it, at q = 0.
+        kind: `revolute` or `prismatic`, as in a table, or `fixed`.
+        origin: (4, 4) transform from the link after it to the link before it, at position 0.
         axis: (3,) unit vector in the link after it; 0 for a fixed one.
-        lower: smallest position [rad or m].
-        upper: largest position [rad or m].
+        moved_by: the joint that moves it, which is another one if it mimics that.
+        gain: 1 if it moves by itself.
+        offset: its position where the joint that moves it is at 0 [rad or m].
+        lower: smallest position of the joint that moves it [rad or m].
+        upper: largest position of the joint that moves it [rad or m].
     """
 
     name: str
     kind: str
     origin: Array
     axis: Array
-    lower: float
-    upper: float
+    moved_by: str = ''
+    gain: float = 1.0
+    offset: float = 0.0
+    lower: float = -math.inf
+    upper: float = math.inf
 
     @property
     def moves(self) -> bool:
         """Whether a table has a joint here."""
-        return self.kind in MOVING
+        return bool(self.moved_by)
 
-    def motion(self, q: Array) -> Array:
-        """Return the (N, 4, 4) motion about or along its axis for (N,) positions [rad or m]."""
-        T = np.tile(np.eye(4), (len(q), 1, 1))
+    def motion(self, position: Array) -> Array:
+        """Return the (N, 4, 4) motions about or along the axis for (N,) positions [rad or m]."""
+        T = np.tile(np.eye(4), (len(position), 1, 1))
         if self.kind == 'prismatic':
-            T[:, :3, 3] = q[:, None] * self.axis
+            T[:, :3, 3] = position[:, None] * self.axis
         else:
-            T[:, :3, :3] = turns_about(self.axis, q)
+            T[:, :3, :3] = turns_about(self.axis, position)
         return T
 
+    def __repr__(self) -> str:
+        return f'<UrdfJoint {self.name[:40]}: {self.kind}>'
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Urdf:
     """The kinematics of a URDF.
 
     Attributes:
-        file: its path.
+        file: its path, or what else it is called in an error.
         name: name of the robot.
         links: names of all links.
         joints: every joint, in the order of the file.
@@ -96,52 +117,134 @@ class Urdf:
         Raises:
             InputFileError: it cannot be read or is not a URDF; says why.
         """
-        file = str(path) if str(path).isprintable() else repr(str(path))
-        robot = _robot_element(file, _read(file, path))
-        links = [link.get('name', '') for link in robot.findall('link')]
-        joints = [_joint_element(element) for element in robot.findall('joint')]
-        return cls(file, robot.get('name', ''), tuple(dict.fromkeys(links)), tuple(joints))
+        file = shown(path)
+        data = first_bytes(path, _LARGEST_FILE + 1)
+        if len(data) > _LARGEST_FILE:
+            raise InputFileError(
+                file, f'has more than {_LARGEST_FILE} bytes; a URDF is smaller'
+            )
+        return cls.parse(data, file)
 
-    def tops(self) -> tuple[str, ...]:
-        """Return the links that hang on nothing: one, if the URDF is a tree."""
+    @classmethod
+    def parse(cls, data: bytes, file: str) -> Urdf:
+        """Return what a URDF says.
+
+        Args:
+            data: the URDF, maybe as `ros2 topic echo` or `ros2 param get` prints it.
+            file: what it is called in an error.
+
+        Raises:
+            InputFileError: it is not a URDF; says why.
+        """
+        robot = robot_element(data, file)
+        version = robot.get('version', '1.0')
+        if version not in _VERSIONS:
+            raise InputFileError(
+                file,
+                f'is a URDF of version {version[:20]!r}; allowed: '
+                f'{", ".join(_VERSIONS)}',
+            )
+        links, joints = [], []
+        for element in robot:
+            if tag(element) == 'link':
+                links.append(element.get('name', ''))
+            elif tag(element) == 'joint':
+                joints.append(_joint_element(element))
+        for kind, names in (
+            ('link', links),
+            ('joint', [joint.name for joint in joints]),
+        ):
+            again = _first_again(names)
+            if again is not None:
+                raise InputFileError(
+                    file,
+                    f'has two {kind}s of the name {again!r}; allowed: each {kind} once',
+                )
+        return cls(file, robot.get('name', ''), tuple(links), tuple(joints))
+
+    def root(self) -> str:
+        """Return the link that poses are given in if no other is named.
+
+        Raises:
+            InputFileError: there is no link, or no `root_link` and several at the top.
+        """
+        if 'root_link' in self.links:
+            return 'root_link'
+        if not self.links:
+            self._fail('has no links')
         children = {joint.child for joint in self.joints}
-        return tuple(link for link in self.links if link not in children)
+        tops = [link for link in self.links if link not in children]
+        if len(tops) != 1:
+            shown = ', '.join(tops[:_MOST_ENDS]) or 'none'
+            self._fail(
+                f'has {len(tops)} links at the top ({shown}); allowed: one, or a root link '
+                'that is named'
+            )
+        return tops[0]
 
     def ends(self) -> tuple[str, ...]:
         """Return the links that nothing hangs on."""
         parents = {joint.parent for joint in self.joints}
         return tuple(link for link in self.links if link not in parents)
 
-    def path(self, root: str, tip: str) -> tuple[UrdfJoint, ...]:
-        """Return the joints from a link down to another.
+    def check_link(self, link: str) -> None:
+        """Refuse a link that is not there.
 
         Raises:
-            InputFileError: there is no such link or no such way, or a joint on it cannot be
-                described by a table.
+            UnknownNameError: lists the links at the ends.
         """
-        for link in (root, tip):
-            if link not in self.links:
-                self._refuse_link(link)
-        joints: list[UrdfJoint] = []
-        passed = {tip}
-        link = tip
-        while link != root:
-            above = self._joint_above(link)
-            if above is None:
-                self._fail(f'link {tip!r} is not below {root!r}; above it is {link!r}')
-            joints.insert(0, self._checked(above))
-            link = above.parent
-            if link in passed:
-                self._fail(f'link {link!r} is above itself; a URDF is a tree')
-            passed.add(link)
-        return tuple(joints)
+        if link in self._links:
+            return
+        ends = self.ends()[:_MOST_ENDS]
+        guess = closest(link, self.links)
+        if guess is None:
+            guess = next(
+                (name for name in self.links if link.casefold() in name.casefold()),
+                None,
+            )
+        advice = f'did you mean {guess!r}?' if guess and guess not in ends else ''
+        raise UnknownNameError('link', link, ends, advice, of=self.file)
+
+    def path(self, root: str, tip: str) -> tuple[UrdfJoint, ...]:
+        """Return the joints from one link to another.
+
+        The way goes down, after it has gone up over fixed joints where the tip is not below the
+        root; those are the other way round then.
+
+        Raises:
+            UnknownNameError: there is no such link; lists those at the ends.
+            InputFileError: there is no such way, or a joint on it cannot be described by a table.
+        """
+        self.check_link(root)
+        self.check_link(tip)
+        down = self._way_up(tip, {root})
+        passed = [tip, *(joint.parent for joint in down)]
+        up = [] if passed[-1] == root else self._way_up(root, {*passed})
+        turn = up[-1].parent if up else root
+        if turn not in passed:
+            self._fail(
+                f'link {tip!r} is not below {root!r}; above it is {passed[-1]!r}'
+            )
+        path = []
+        for element in up:
+            joint = self._checked(element)
+            if joint.kind != 'fixed':
+                self._fail(
+                    f'link {tip!r} is not below {root!r}, and joint {joint.name!r} above '
+                    f'{root!r} moves'
+                )
+            origin = np.asarray(np.linalg.inv(joint.origin))
+            path.append(joint._replace(origin=origin))
+        for element in reversed(down[: passed.index(turn)]):
+            path.append(self._checked(element))
+        return tuple(path)
 
     def forward(self, root: str, tip: str, positions: Mapping[str, Array]) -> Array:
         """Return T_root_tip, multiplied out joint by joint.
 
         Args:
             root: name of a link.
-            tip: name of a link below it.
+            tip: name of another link.
             positions: (N,) positions by joint [rad or m]; those of others are 0.
 
         Returns:
@@ -151,39 +254,108 @@ class Urdf:
         T = np.broadcast_to(np.eye(4), (n, 4, 4))
         for joint in self.path(root, tip):
             T = T @ joint.origin
-            if joint.moves and joint.name in positions:
-                T = T @ joint.motion(positions[joint.name])
+            if joint.moves:
+                master = positions.get(joint.moved_by, np.zeros(n))
+                T = T @ joint.motion(joint.gain * np.asarray(master) + joint.offset)
         return T
 
-    def _joint_above(self, link: str) -> JointElement | None:
-        above = [joint for joint in self.joints if joint.child == link]
-        if len(above) > 1:
-            names = ' and '.join(repr(joint.name) for joint in above[:2])
-            self._fail(f'link {link!r} has two parents, joints {names}; a URDF is a tree')
-        return above[0] if above else None
+    @cached_property
+    def _links(self) -> frozenset[str]:
+        return frozenset(self.links)
+
+    @cached_property
+    def _joints_by_name(self) -> dict[str, JointElement]:
+        return {joint.name: joint for joint in self.joints}
+
+    @cached_property
+    def _joints_above(self) -> dict[str, list[JointElement]]:
+        """The joints that lead to each link: one, if the URDF is a tree."""
+        above: dict[str, list[JointElement]] = {}
+        for joint in self.joints:
+            above.setdefault(joint.child, []).append(joint)
+        return above
+
+    def _way_up(self, link: str, ends: set[str]) -> list[JointElement]:
+        """Return the joints above a link, up to one of some links or to the top."""
+        way: list[JointElement] = []
+        passed = {link}
+        while link in self._joints_above and link not in ends:
+            above = self._joints_above[link]
+            if len(above) > 1:
+                self._fail(
+                    f'link {link!r} has two parents, joints {above[0].name!r} and '
+                    f'{above[1].name!r}; a URDF is a tree'
+                )
+            way.append(above[0])
+            link = above[0].parent
+            if link in passed:
+                self._fail(f'link {link!r} is above itself; a URDF is a tree')
+            passed.add(link)
+        return way
 
     def _checked(self, joint: JointElement) -> UrdfJoint:
-        """Return a joint with its numbers read."""
+        """Return a joint of the way with its numbers read, once."""
+        if joint.name not in self._read_joints:
+            self._read_joints[joint.name] = self._read(joint)
+        return self._read_joints[joint.name]
+
+    @cached_property
+    def _read_joints(self) -> dict[str, UrdfJoint]:
+        return {}
+
+    def _read(self, joint: JointElement) -> UrdfJoint:
         if joint.kind not in (*MOVING, 'fixed'):
-            self._fail(f'joint {joint.name!r} is {joint.kind}; allowed: revolute, continuous, '
-                       'prismatic, fixed')
-        if joint.parent not in self.links:
-            self._fail(f'joint {joint.name!r} names the link {joint.parent!r}, which is not there')
-        if ('mimic', 'joint') in joint.texts:
-            self._fail(f'joint {joint.name!r} mimics {joint.texts["mimic", "joint"]!r}; a table '
-                       'has joints that move by themselves')
+            self._fail(
+                f'joint {joint.name!r} is {joint.kind or "of no type"}; allowed: revolute, '
+                'continuous, prismatic, fixed'
+            )
+        for link in (joint.parent, joint.child):
+            if link not in self._links:
+                self._fail(
+                    f'joint {joint.name!r} names the link {link!r}, which is not there'
+                )
+        if not joint.name:
+            self._fail(
+                f'the joint from {joint.parent!r} to {joint.child!r} has no name'
+            )
+        for name in (joint.name, joint.parent, joint.child):
+            if REPLACEMENT in name:
+                self._fail(f'the name {name!r} has a byte that is not UTF-8 text')
         origin = self._origin(joint)
         if joint.kind == 'fixed':
-            return UrdfJoint(joint.name, joint.kind, origin, np.zeros(3), 0.0, 0.0)
-        lower, upper = self._limits(joint)
-        return UrdfJoint(joint.name, joint.kind, origin, self._axis(joint), lower, upper)
+            return UrdfJoint(joint.name, joint.kind, origin, np.zeros(3))
+        axis, kind = self._axis(joint), MOVING[joint.kind]
+        master, gain, offset = self._master(joint)
+        if gain == 0.0:  # it stays where it is
+            still = UrdfJoint(joint.name, kind, origin, axis)
+            T = origin @ still.motion(np.array([offset]))[0]
+            return UrdfJoint(joint.name, 'fixed', T, np.zeros(3))
+        lower, upper = self._limits(master)
+        return UrdfJoint(
+            joint.name, kind, origin, axis, master, gain, offset, lower, upper
+        )
 
     def _origin(self, joint: JointElement) -> Array:
-        x, y, z = np.eye(3)
-        roll, pitch, yaw = self._numbers(joint, 'origin', 'rpy', '0 0 0')
         T = np.eye(4)
-        T[:3, :3] = turns_about(z, yaw) @ turns_about(y, pitch) @ turns_about(x, roll)
         T[:3, 3] = self._numbers(joint, 'origin', 'xyz', '0 0 0')
+        if ('origin', 'quat_xyzw') not in joint.texts:
+            x, y, z = np.eye(3)
+            roll, pitch, yaw = self._numbers(joint, 'origin', 'rpy', '0 0 0')
+            T[:3, :3] = (
+                turns_about(z, yaw) @ turns_about(y, pitch) @ turns_about(x, roll)
+            )
+            return T
+        if ('origin', 'rpy') in joint.texts:
+            self._fail(
+                f'joint {joint.name!r}: origin has rpy and quat_xyzw; allowed: one of them'
+            )
+        quaternion = np.array(self._numbers(joint, 'origin', 'quat_xyzw', '0 0 0 1'))
+        length = float(np.linalg.norm(quaternion))
+        if length < 1e-9:
+            self._fail(
+                f'joint {joint.name!r}: origin quat_xyzw is 0 0 0 0; allowed: a rotation'
+            )
+        T[:3, :3] = quaternion_to_matrix(quaternion / length)
         return T
 
     def _axis(self, joint: JointElement) -> Array:
@@ -193,85 +365,98 @@ class Urdf:
             self._fail(f'joint {joint.name!r}: axis is 0 0 0; allowed: a direction')
         return axis / length
 
-    def _limits(self, joint: JointElement) -> tuple[float, float]:
-        if joint.kind not in ('revolute', 'prismatic'):
+    def _master(self, joint: JointElement) -> tuple[str, float, float]:
+        """Return the joint that moves a joint, how far it does, and from where.
+
+        That joint may be in JointState messages only, as robot_state_publisher has it.
+        """
+        gain, offset = 1.0, 0.0
+        name = joint.name
+        passed = [name]
+        while name in self._joints_by_name:
+            joint = self._joints_by_name[name]
+            if not any(element == 'mimic' for element, _ in joint.texts):
+                break
+            (multiplier,) = self._numbers(joint, 'mimic', 'multiplier', '1')
+            (own_offset,) = self._numbers(joint, 'mimic', 'offset', '0')
+            offset += gain * own_offset
+            gain *= multiplier
+            name = joint.texts.get(('mimic', 'joint'), '')
+            if not name:
+                self._fail(f'joint {joint.name!r}: mimic has no joint')
+            if name in passed:
+                self._fail(f'joint {name!r} mimics itself, by {" and ".join(passed)}')
+            passed.append(name)
+        return name, gain, offset
+
+    def _limits(self, name: str) -> tuple[float, float]:
+        joint = self._joints_by_name.get(name)
+        if joint is None or joint.kind not in ('revolute', 'prismatic'):
             return -math.inf, math.inf
-        if ('limit', 'lower') not in joint.texts and ('limit', 'upper') not in joint.texts:
+        if ('limit', 'lower') not in joint.texts and (
+            'limit',
+            'upper',
+        ) not in joint.texts:
             return -math.inf, math.inf
-        lower, = self._numbers(joint, 'limit', 'lower', '0')
-        upper, = self._numbers(joint, 'limit', 'upper', '0')
+        (lower,) = self._numbers(joint, 'limit', 'lower', '0')
+        (upper,) = self._numbers(joint, 'limit', 'upper', '0')
         if lower > upper:
-            self._fail(f'joint {joint.name!r}: limit lower {lower:g} is above upper {upper:g}')
+            self._fail(
+                f'joint {joint.name!r}: limit lower {lower:g} is above upper {upper:g}'
+            )
         return lower, upper
 
-    def _numbers(self, joint: JointElement, tag: str, key: str, default: str) -> list[float]:
+    def _numbers(
+        self, joint: JointElement, element: str, key: str, default: str
+    ) -> list[float]:
         """Return the numbers of an attribute, as many as its default has."""
-        if (tag, key) not in joint.texts:
-            return [float(word) for word in default.split()]
-        text = joint.texts[tag, key]
+        text = joint.texts.get((element, key), default)
+        words = text.split()
         count = len(default.split())
-        try:
-            values = [float(word) for word in text.split()]
-        except ValueError:
-            values = []
-        is_finite = all(math.isfinite(value) for value in values)
-        if len(values) != count or not is_finite:
-            self._fail(f'joint {joint.name!r}: {tag} {key} is {text[:60]!r}; allowed: {count} '
-                       f'finite number{"s" * (count > 1)}')
-        if tag != 'limit' and max(map(abs, values)) > _LARGEST:
-            self._fail(f'joint {joint.name!r}: {tag} {key} is {text[:60]!r}; allowed: up to '
-                       f'{_LARGEST:g}')
+        are_numbers = all(_NUMBER.fullmatch(word) for word in words)
+        if len(words) != count or not are_numbers:
+            self._fail(
+                f'joint {joint.name!r}: {element} {key} is {text[:60]!r}; allowed: {count} '
+                f'finite number{"s" * (count > 1)}'
+            )
+        values = [float(word) for word in words]
+        largest = sys.float_info.max if element == 'limit' else _LARGEST
+        if not all(abs(value) <= largest for value in values):
+            self._fail(
+                f'joint {joint.name!r}: {element} {key} is {text[:60]!r}; allowed: up to '
+                f'{largest:g}'
+            )
         return values
-
-    def _refuse_link(self, link: str) -> NoReturn:
-        guess = closest(link, self.links)
-        if guess is None:
-            holding = [name for name in self.links if link.casefold() in name.casefold()]
-            guess = holding[0] if holding else None
-        hint = f'did you mean {guess!r}? ' if guess else ''
-        known = ', '.join(self.links[:_LISTED])
-        more = ' and more' if len(self.links) > _LISTED else ''
-        self._fail(f'unknown link {link!r}; {hint}known: {known}{more}')
 
     def _fail(self, fault: str) -> NoReturn:
         raise InputFileError(self.file, fault)
 
-
-def _read(file: str, path: str | Path) -> bytes:
-    try:
-        with open(path, 'rb') as stream:
-            data = stream.read(_LARGEST_FILE + 1)
-    except (OSError, ValueError) as error:  # a ValueError for a zero byte in the path
-        reason = getattr(error, 'strerror', None) or str(error)
-        raise InputFileError(file, f'cannot be read: {reason.lower()}') from None
-    if len(data) > _LARGEST_FILE:
-        raise InputFileError(file, f'has more than {_LARGEST_FILE} bytes; a URDF is smaller')
-    return data
+    def __repr__(self) -> str:
+        return f'<Urdf {self.name[:40]}: {len(self.links)} links, {len(self.joints)} joints>'
 
 
-def _robot_element(file: str, data: bytes) -> ET.Element:
-    if b'<!DOCTYPE' in data or b'<!ENTITY' in data:
-        raise InputFileError(file, 'declares a document type or entities, which a URDF has no use '
-                                   'for')
-    try:
-        robot = ET.fromstring(data)
-    except (ET.ParseError, ValueError, LookupError) as error:
-        raise InputFileError(file, f'is not XML: {error}') from None
-    if any('xacro}' in str(element.tag) for element in robot.iter()):
-        raise InputFileError(file, 'is a xacro file; this makes a URDF of it: xacro '
-                                   f'{Path(file).name} > robot.urdf')
-    if robot.tag != 'robot':
-        raise InputFileError(file, f'is not a URDF: its root is <{robot.tag[:60]}>; allowed: '
-                                   '<robot>')
-    return robot
-
-
-def _joint_element(element: ET.Element) -> JointElement:
-    texts = {}
+def _joint_element(element: etree._Element) -> JointElement:
+    texts: dict[tuple[str, str], str] = {}
+    seen: set[str] = set()
     for part in element:
-        if element.find(part.tag) is part:  # of several the first counts
+        name = tag(part)
+        if name not in seen:  # of several the first counts
+            seen.add(name)
             for key, value in part.items():
-                texts[part.tag, key] = value
+                texts[name, key] = value
     return JointElement(
-        element.get('name', ''), element.get('type', ''), texts.get(('parent', 'link'), ''),
-        texts.get(('child', 'link'), ''), texts)
+        element.get('name', ''),
+        element.get('type', ''),
+        texts.get(('parent', 'link'), ''),
+        texts.get(('child', 'link'), ''),
+        texts,
+    )
+
+
+def _first_again(names: list[str]) -> str | None:
+    seen = set()
+    for name in names:
+        if name in seen:
+            return name
+        seen.add(name)
+    return None

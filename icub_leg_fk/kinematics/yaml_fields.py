@@ -17,6 +17,7 @@ import reprlib
 from typing import Any, NoReturn
 
 from icub_leg_fk.errors import CatalogError, closest
+from icub_leg_fk.kinematics.input_bytes import first_bytes, shown
 import yaml
 
 MAX_BYTES = 1_000_000
@@ -37,10 +38,14 @@ class TextKind:
 
 
 NAME = TextKind(re.compile(r'(?=.*\S).{1,300}'), 'up to 300 printable characters')
-FRAME_ID = TextKind(re.compile(r'(?!/)(?=.*\S).{1,300}'),  # tf2 cannot look up a leading slash
-                    'up to 300 printable characters, not beginning with /')
-WORD = TextKind(re.compile(r'[A-Za-z][A-Za-z0-9_]{0,63}'),
-                'a letter, then up to 63 letters, digits and _')
+FRAME_ID = TextKind(
+    re.compile(r'(?!/)(?=.*\S).{1,300}'),  # tf2 cannot look up a leading slash
+    'up to 300 printable characters, not beginning with /',
+)
+WORD = TextKind(
+    re.compile(r'[A-Za-z][A-Za-z0-9_]{0,63}'),
+    'a letter, then up to 63 letters, digits and _',
+)
 LINE = TextKind(re.compile(r'.{0,300}'), 'text of one line')
 
 _short = reprlib.Repr()
@@ -62,7 +67,9 @@ class Field:
 
     def fail(self, allowed: str, found: str | None = None) -> NoReturn:
         """Raise the error that says what stands here and what may."""
-        raise CatalogError(self.file, self.line, self.where, found or self.found(), allowed)
+        raise CatalogError(
+            self.file, self.line, self.where, found or self.found(), allowed
+        )
 
     def found(self) -> str:
         """Return what stands here, short enough for one line."""
@@ -85,8 +92,9 @@ class Field:
             return False
         return any(name.value == key for name, _ in self.node.value)
 
-    def mapping(self, content: str, where: Callable[[str], str],
-                kind: TextKind = NAME) -> dict[str, Field]:
+    def mapping(
+        self, content: str, where: Callable[[str], str], kind: TextKind = NAME
+    ) -> dict[str, Field]:
         """Return the values of a mapping by name, refusing a key that stands twice.
 
         Args:
@@ -100,29 +108,37 @@ class Field:
         for key, value in self.node.value:
             name = Field(self.file, self.where, key).name('a name', kind)
             if name in fields:
-                Field(self.file, where(name), key).fail('each key once', 'a duplicate key')
+                Field(self.file, where(name), key).fail(
+                    'each key once', 'a duplicate key'
+                )
             fields[name] = Field(self.file, where(name), value)
         return fields
 
-    def record(self, required: tuple[str, ...], optional: tuple[str, ...] = ()
-               ) -> dict[str, Field]:
+    def record(
+        self, required: tuple[str, ...], optional: tuple[str, ...] = ()
+    ) -> dict[str, Field]:
         """Return the fields of a mapping whose keys are fixed."""
         known = required + optional
-        fields = self.mapping(f'a mapping with {", ".join(known)}',
-                              lambda key: f'{self.where}, field {key}')
+        fields = self.mapping(
+            f'a mapping with {", ".join(known)}',
+            lambda key: f'{self.where}, field {key}',
+        )
         for key, _ in self.node.value:
             if key.value not in known:
                 guess = closest(key.value, known)
                 hint = f' (did you mean {guess!r}?)' if guess else ''
                 Field(self.file, self.where, key).fail(
-                    ', '.join(known), f'unknown key {_short.repr(key.value)}{hint}')
+                    ', '.join(known), f'unknown key {_short.repr(key.value)}{hint}'
+                )
         for name in required:
             if name not in fields:
-                self.at(f'field {name}').fail(f'all of {", ".join(required)}', 'nothing')
+                self.at(f'field {name}').fail(
+                    f'all of {", ".join(required)}', 'nothing'
+                )
         return fields
 
     def items(self, content: str, length: int | None = None) -> Iterator[Field]:
-        """Yield the items of a list, at least one, or so many."""
+        """Yield the items of a list, which has at least one, or exactly `length`."""
         if not isinstance(self.node, yaml.SequenceNode):
             self.fail(content)
         count = len(self.node.value)
@@ -173,7 +189,9 @@ class Field:
 
     def _scalar(self, pattern: re.Pattern[str]) -> str | None:
         """Return the text of a scalar that matches, or None."""
-        if isinstance(self.node, yaml.ScalarNode) and pattern.fullmatch(self.node.value):
+        if isinstance(self.node, yaml.ScalarNode) and pattern.fullmatch(
+            self.node.value
+        ):
             return str(self.node.value)
         return None
 
@@ -184,19 +202,31 @@ def read_yaml(path: str | Path) -> Field:
     Raises:
         CatalogError: it cannot be read, is too large, or is not one document of YAML.
     """
-    file = str(path) if str(path).isprintable() else repr(str(path))
-    data = _read(file, path)
+    file = shown(path)
+    data = first_bytes(path, MAX_BYTES + 1)
+    if len(data) > MAX_BYTES:
+        _fail(file, 0, f'more than {MAX_BYTES} bytes', f'at most {MAX_BYTES} bytes')
     try:
         node = yaml.compose(data, Loader=Loader)
-    except yaml.reader.ReaderError as error:  # bytes that are no text, or no printable text
+    except (
+        yaml.reader.ReaderError
+    ) as error:  # bytes that are not text, or not printable
         line = data.count(b'\n', 0, error.position) + 1
-        _fail(file, line, f'a byte or character that is no printable UTF-8 text ({error.reason})',
-              'UTF-8 text')
+        _fail(
+            file,
+            line,
+            f'a byte or character that is not printable UTF-8 text ({error.reason})',
+            'UTF-8 text',
+        )
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         problem = ' '.join(str(error.problem or error.context).split())
-        _fail(file, mark.line + 1 if mark else 0, f'text that is not YAML ({problem})',
-              'one document of well-formed YAML')
+        _fail(
+            file,
+            mark.line + 1 if mark else 0,
+            f'text that is not YAML ({problem})',
+            'one document of well-formed YAML',
+        )
     except RecursionError:
         _fail(file, 0, 'too many nested levels', 'well-formed YAML')
     if node is None:
@@ -206,15 +236,3 @@ def read_yaml(path: str | Path) -> Field:
 
 def _fail(file: str, line: int, found: str, allowed: str) -> NoReturn:
     raise CatalogError(file, line, 'kinematics file', found, allowed) from None
-
-
-def _read(file: str, path: str | Path) -> bytes:
-    try:
-        with open(path, 'rb') as stream:
-            data = stream.read(MAX_BYTES + 1)
-    except (OSError, ValueError) as error:  # a ValueError for a zero byte in the path
-        reason = getattr(error, 'strerror', None) or str(error)
-        raise CatalogError(file, 0, '', reason.lower(), 'a readable kinematics file') from None
-    if len(data) > MAX_BYTES:
-        _fail(file, 0, f'more than {MAX_BYTES} bytes', f'at most {MAX_BYTES} bytes')
-    return data

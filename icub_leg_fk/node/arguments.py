@@ -17,8 +17,16 @@ import yaml
 _PARAMETER = ('-p', '--param')
 _REMAPPING = ('-r', '--remap')
 _FILE = '--params-file'
-_WITH_VALUE = (*_PARAMETER, *_REMAPPING, _FILE, '-e', '--enclave', '--log-level',
-               '--log-config-file', '--log-file-name')
+_WITH_VALUE = (
+    *_PARAMETER,
+    *_REMAPPING,
+    _FILE,
+    '-e',
+    '--enclave',
+    '--log-level',
+    '--log-config-file',
+    '--log-file-name',
+)
 _TOKENS = {'*': '/[^/]+', '**': '(/[^/]+)*'}
 
 
@@ -109,8 +117,10 @@ def files_for_others(arguments: Iterable[Argument], node: str) -> list[str]:
         except InputFileError:  # rcl has read it, which is what counts
             continue
         if places and not any(_is_for(place, node) for place in places):
-            lines.append(f'nothing was taken from {file}: it is for {listed(places)}, and this '
-                         f'node is {node}')
+            lines.append(
+                f'nothing was taken from {file}: it is for {listed(places)}, and this '
+                f'node is {node}'
+            )
     return lines
 
 

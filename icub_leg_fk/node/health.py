@@ -10,20 +10,44 @@ from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from icub_leg_fk.node.outputs import pose_topic
-from icub_leg_fk.stream.joint_input import ChainLook, JointInput, Look, REJECTIONS, TIME_JUMP
-from icub_leg_fk.stream.notes import INFO, listed, Note, notes_of, WARNING
+from icub_leg_fk.stream.configuration import Configuration
+from icub_leg_fk.stream.description import Description, UNUSABLE
+from icub_leg_fk.stream.joint_input import (
+    ChainLook,
+    JointInput,
+    Look,
+    REJECTIONS,
+    TIME_JUMP,
+)
+from icub_leg_fk.stream.notes import ERROR, INFO, listed, Note, notes_of, WARNING
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 JOINT_STATE = 'sensor_msgs/msg/JointState'
+POSE_STAMPED = 'geometry_msgs/msg/PoseStamped'
+STRING = 'std_msgs/msg/String'
 PATIENCE = 5  # looks that some notes must last before they are logged
 
 _PERIOD = 1.0  # s from look to look
 _THROTTLE = 5.0  # s between two lines in the log for one reason
-_PATIENT = ('silence', 'no_match', 'always_empty', 'no_clock', 'same_name')
-_THROTTLED = ('malformed', 'position_length', 'duplicate_name', 'missing_joint', 'stale_joint',
-              'non_finite', 'no_velocity')
-_NOT_LOGGED = ('out_of_range',)
+_PATIENT = (
+    'silence',
+    'no_match',
+    'always_empty',
+    'no_clock',
+    'same_name',
+    'no_description',
+)
+_THROTTLED = (
+    'malformed',
+    'position_length',
+    'duplicate_name',
+    'missing_joint',
+    'stale_joint',
+    'non_finite',
+    'no_velocity',
+)
+_NOT_LOGGED = ('out_of_range', UNUSABLE)
 
 
 class Surroundings(NamedTuple):
@@ -94,20 +118,29 @@ class Health:
         node: the node to speak for.
         joint_input: the joint input.
         topic: full name of the topic the joint states come from.
+        description: the description of the robot.
     """
 
-    def __init__(self, node: Node, joint_input: JointInput, topic: str) -> None:
+    def __init__(
+        self, node: Node, joint_input: JointInput, topic: str, description: Description
+    ) -> None:
         self._node = node
         self._input = joint_input
         self._topic = topic
+        self._description = description
         self._log = HealthLog(node.get_logger())
         self._totals = Totals()
         self._announcement: Sequence[Note] = ()
         self._announced: Sequence[Note] = ()
         self._last_look = self._last_message = time.monotonic()
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        self._timer = node.create_timer(_PERIOD, self._show,
-                                        clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._timer = node.create_timer(
+            _PERIOD, self._show, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
+
+    def configure(self, configuration: Configuration) -> None:
+        """Take in what is published."""
+        self._configuration = configuration
 
     def announce(self, notes: Sequence[Note]) -> None:
         """Take what there is to say of the configuration; the next look says it.
@@ -132,51 +165,64 @@ class Health:
         if look.messages:
             self._last_message = now
         around = self._surroundings(silence=now - self._last_message)
-        notes = notes_around(look, around, self._totals) + notes_of(look, self._topic)
+        notes = [
+            *notes_around(look, around, self._totals),
+            *notes_of(look, self._topic, self._configuration.joint_prefix),
+            *self._description.notes(
+                self._publishers_of(self._description.topic, STRING)
+            ),
+        ]
         self._totals.add(look)
         self._log.show(notes, look)
         array = DiagnosticArray()
         array.header.stamp = self._node.get_clock().now().to_msg()
         for chain_look in look.chains.values():
-            status = self._status(look, chain_look, notes)
+            chain = chain_look.chain
+            status = self._status(chain.name, *verdict(look, chain_look, notes))
+            status.hardware_id = f'{chain.name}={chain.version}'
             status.values = self._values(chain_look, period, around)
             array.status.append(status)
+        for name in self._configuration.awaited:
+            array.status.append(self._status(name, *verdict_of_waiting(notes)))
         self._publisher.publish(array)
 
     def _surroundings(self, silence: float) -> Surroundings:
         """Return what is around the node."""
         node = self._node
-        publishers, other_types = [], []
-        for info in node.get_publishers_info_by_topic(self._topic):
-            if info.topic_type == JOINT_STATE:
-                publishers.append(_full_name(info))
-            else:
-                other_types.append(info.topic_type)
-        own_topic = node.resolve_topic_name(pose_topic(self._input.chains[0]))
-        pose_publishers = node.get_publishers_info_by_topic(own_topic)
+        publishers = self._publishers_of(self._topic, JOINT_STATE)
+        infos = node.get_publishers_info_by_topic(self._topic)
+        other_types = [
+            info.topic_type for info in infos if info.topic_type != JOINT_STATE
+        ]
+        pose_publishers = []
+        for chain in self._input.chains[:1]:
+            own_topic = node.resolve_topic_name(pose_topic(chain))
+            pose_publishers = self._publishers_of(own_topic, POSE_STAMPED)
         return Surroundings(
             topic=self._topic,
-            publishers=sorted(publishers),
+            publishers=publishers,
             other_types=sorted(other_types),
             silence=silence,
             has_time=node.get_clock().now().nanoseconds > 0,
             name=node.get_fully_qualified_name(),
-            pose_publishers=[_full_name(info) for info in pose_publishers])
+            pose_publishers=pose_publishers,
+        )
 
-    def _status(self, look: Look, chain_look: ChainLook, notes: Sequence[Note]
-                ) -> DiagnosticStatus:
+    def _publishers_of(self, topic: str, message_type: str) -> list[str]:
+        """Return the full names of the nodes that publish messages of a type on a topic."""
+        infos = self._node.get_publishers_info_by_topic(topic)
+        return sorted(
+            _full_name(info) for info in infos if info.topic_type == message_type
+        )
+
+    def _status(self, chain: str, level: bytes, message: str) -> DiagnosticStatus:
         """Return the status of a chain, without values."""
-        chain = chain_look.chain
         name = self._node.get_fully_qualified_name().lstrip('/')
-        level, message = verdict(look, chain_look, notes)
-        return DiagnosticStatus(
-            level=level,
-            name=f'{name}: {chain.name}',
-            message=message,
-            hardware_id=f'{chain.name}={chain.version}')
+        return DiagnosticStatus(level=level, name=f'{name}: {chain}', message=message)
 
-    def _values(self, chain_look: ChainLook, period: float, around: Surroundings
-                ) -> list[KeyValue]:
+    def _values(
+        self, chain_look: ChainLook, period: float, around: Surroundings
+    ) -> list[KeyValue]:
         """Return the values of a chain's status."""
         chain = chain_look.chain
         stamps = self._input.held_stamps(chain).values()
@@ -187,6 +233,7 @@ class Health:
             'age (s)': f'{(now - max(stamps)) / 1e9:.3f}' if stamps else '',
             'topic': self._topic,
             'publishers': len(around.publishers),
+            'description': self._description.value(chain.name),
             **self._totals.values(chain.name),
         }
         for reason, joints in sorted(chain_look.joints.items()):
@@ -227,6 +274,8 @@ class HealthLog:
         """Log a note."""
         if note.level == INFO:
             self._logger.info(str(note))
+        elif note.level == ERROR:
+            self._logger.error(str(note))
         else:
             self._logger.warning(str(note))
 
@@ -235,7 +284,9 @@ class HealthLog:
             return False
         if note.key == TIME_JUMP:
             return True
-        return self._looks[note.key, note.chain] == (PATIENCE if note.key in _PATIENT else 1)
+        return self._looks[note.key, note.chain] == (
+            PATIENCE if note.key in _PATIENT else 1
+        )
 
 
 def notes_around(look: Look, around: Surroundings, before: Totals) -> list[Note]:
@@ -254,34 +305,61 @@ def notes_around(look: Look, around: Surroundings, before: Totals) -> list[Note]
     ]
 
 
-def verdict(look: Look, chain_look: ChainLook, notes: Sequence[Note]) -> tuple[bytes, str]:
+def verdict(
+    look: Look, chain_look: ChainLook, notes: Sequence[Note]
+) -> tuple[bytes, str]:
     """Return level and message of a chain's status."""
-    concerned = ('', chain_look.chain.name)
-    warnings = [note for note in notes if note.level == WARNING and note.chain in concerned]
-    message = '; '.join(note.text for note in warnings)
+    concerned = [note for note in notes if note.chain in ('', chain_look.chain.name)]
+    has_error, message = _summary(concerned)
+    if has_error:
+        return DiagnosticStatus.ERROR, message
     if look.messages == 0:
         return DiagnosticStatus.STALE, message
     if chain_look.ready == 0:
-        return DiagnosticStatus.ERROR, message or 'no message with a position of its joints'
+        return (
+            DiagnosticStatus.ERROR,
+            message or 'no message with a position of its joints',
+        )
     if message:
         return DiagnosticStatus.WARN, message
     return DiagnosticStatus.OK, 'publishing'
 
 
+def verdict_of_waiting(notes: Sequence[Note]) -> tuple[bytes, str]:
+    """Return level and message of the status of a chain that waits for a description."""
+    has_error, message = _summary(notes)
+    return DiagnosticStatus.ERROR if has_error else DiagnosticStatus.STALE, message
+
+
+def _summary(notes: Sequence[Note]) -> tuple[bool, str]:
+    """Return whether there is an error among some notes, and all that is more than information."""
+    serious = [note for note in notes if note.level != INFO]
+    has_error = any(note.level == ERROR for note in serious)
+    return has_error, '; '.join(note.text for note in serious)
+
+
 def _of_silence(look: Look, around: Surroundings, before: Totals) -> Iterator[Note]:
     if look.messages == 0:
         counted = f', {before.messages} before' if before.messages else ''
-        yield Note('silence', '', WARNING,
-                   f'no JointState received on {around.topic} for {around.silence:.0f} s{counted}'
-                   f'; it has {around.publisher_count()}')
+        yield Note(
+            'silence',
+            '',
+            WARNING,
+            f'no JointState received on {around.topic} for {around.silence:.0f} s{counted}'
+            f'; it has {around.publisher_count()}',
+        )
 
 
 def _of_the_start(look: Look, around: Surroundings, before: Totals) -> Iterator[Note]:
     for name, chain_look in look.chains.items():
         if chain_look.ready and not before.ready[name]:
-            yield Note(f'first pose of {name}', '', INFO,
-                       f'first pose of {chain_look.chain.tip}; {around.publisher_count()} on '
-                       f'{around.topic}')
+            yield Note(
+                f'first pose of {name}',
+                '',
+                INFO,
+                f'first pose of {chain_look.chain.tip}; {around.publisher_count()} on '
+                f'{around.topic}',
+            )
 
 
 def _of_publishers(look: Look, around: Surroundings) -> Iterator[Note]:
@@ -291,18 +369,31 @@ def _of_publishers(look: Look, around: Surroundings) -> Iterator[Note]:
     yield Note('publishers', '', INFO, f'{around.publisher_count()} on {around.topic}')
     for name, chain_look in look.chains.items():
         if chain_look.ready + chain_look.silent == look.messages:
-            yield Note('same_joints', name, WARNING,
-                       f'every message on {around.topic} brings its joints, and it has '
-                       f'{around.publisher_count()}: {", ".join(around.publishers)}')
+            yield Note(
+                'same_joints',
+                name,
+                WARNING,
+                f'every message on {around.topic} brings its joints, and it has '
+                f'{around.publisher_count()}: {", ".join(around.publishers)}',
+            )
 
 
 def _of_clock_and_name(around: Surroundings) -> Iterator[Note]:
     if not around.has_time:
-        yield Note('no_clock', '', WARNING, 'use_sim_time is set, but no time has come on /clock')
+        yield Note(
+            'no_clock',
+            '',
+            WARNING,
+            'use_sim_time is set, but no time has come on /clock',
+        )
     if around.pose_publishers.count(around.name) > 1:
-        yield Note('same_name', '', WARNING,
-                   f'another node is called {around.name} and publishes the same topics; give one '
-                   'of them another name: --ros-args -r __node:=NAME')
+        yield Note(
+            'same_name',
+            '',
+            WARNING,
+            f'another node is called {around.name} and publishes the same topics; give one '
+            'of them another name: --ros-args -r __node:=NAME',
+        )
 
 
 def _full_name(info: Any) -> str:

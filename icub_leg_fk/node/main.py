@@ -18,11 +18,13 @@ Subscribes to joint_states (sensor_msgs/JointState) and publishes the poses of t
 
 examples:
   foot_pose_publisher --ros-args -p version:=v2_5
+  foot_pose_publisher --ros-args -p description_from_topic:=true
   foot_pose_publisher --ros-args -p chains:="[left_leg, head_imu=v2]" -p foot_frame:=sole
   foot_pose_publisher --ros-args --params-file foot_pose_publisher.yaml
 
-parameters: chains, version, kinematics_file, foot_frame, frame_prefix, joint_timeout,
-stamp_source, publish_tf, publish_twist, publish_markers. While the node runs, this explains each:
+parameters: chains, version, kinematics_file, description_from_topic, root_frame, joint_prefix,
+foot_frame, frame_prefix, joint_timeout, stamp_source, publish_tf, publish_twist,
+publish_markers. While the node runs, this explains each:
   ros2 param describe /foot_pose_publisher NAME
 """
 
@@ -33,7 +35,9 @@ def main() -> int:
     rclpy's own signal handlers raise out of whatever the interpreter is doing, and a second signal
     during shutdown ends in a traceback; `ros2 launch` sends SIGINT twice.
     """
-    received: list[int] = []  # an Event would block where one signal comes upon the other
+    received: list[
+        int
+    ] = []  # an Event would block where one signal comes upon the other
     for number in _SIGNALS:
         signal.signal(number, lambda number, _: received.append(number))
     try:
@@ -59,7 +63,9 @@ def _run(argv: Sequence[str], received: Sequence[int]) -> None:
         executor.add_node(node)
         while rclpy.ok() and not received:
             # Unlike spin_once, this takes message after message without coming back in between.
-            executor.spin_until_future_complete(rclpy.task.Future(), timeout_sec=_SPIN_PERIOD)
+            executor.spin_until_future_complete(
+                rclpy.task.Future(), timeout_sec=_SPIN_PERIOD
+            )
     finally:
         rclpy.try_shutdown()
 
@@ -67,10 +73,13 @@ def _run(argv: Sequence[str], received: Sequence[int]) -> None:
 def _rclpy() -> Any:
     try:
         import rclpy
+
         return rclpy
     except ImportError as error:
         raise MissingDependencyError(
-            'rclpy', 'the node', f"source ROS 2, or pip install 'icub_leg_fk[ros]' ({error})"
+            'rclpy',
+            'the node',
+            f"source ROS 2, or pip install 'icub_leg_fk[ros]' ({error})",
         ) from error
 
 
@@ -78,13 +87,16 @@ def _node(rclpy: Any, argv: Sequence[str]) -> Any:
     """Return the node as the command line wants it."""
     from icub_leg_fk.node.foot_pose_publisher import FootPosePublisher, START_ERRORS
     from icub_leg_fk.node.parameters import PARAMETER_NAMES
+
     check_assignments(read_arguments(argv), PARAMETER_NAMES)
     no_handlers = rclpy.signals.SignalHandlerOptions.NO
     try:
         rclpy.init(args=argv, signal_handler_options=no_handlers)
         others = rclpy.utilities.remove_ros_args(argv)[1:]
         if others:
-            raise LegFKError(f'unknown argument {others[0]!r}; parameters go after --ros-args')
+            raise LegFKError(
+                f'unknown argument {others[0]!r}; parameters go after --ros-args'
+            )
         return FootPosePublisher()
     except START_ERRORS as error:
         raise LegFKError(_said_by_rclpy(error)) from error
@@ -102,12 +114,15 @@ def _executor() -> Any:
     """Return the cheapest executor there is: events, or wait sets if rclpy has no events one."""
     try:
         from rclpy.experimental.events_executor import EventsExecutor
+
         return EventsExecutor()
     except (ImportError, AttributeError, RuntimeError) as error:
         from rclpy.executors import SingleThreadedExecutor
         from rclpy.logging import get_logger
+
         get_logger('foot_pose_publisher').info(
-            f'no EventsExecutor ({error}); using the SingleThreadedExecutor')
+            f'no EventsExecutor ({error}); using the SingleThreadedExecutor'
+        )
         return SingleThreadedExecutor()
 
 

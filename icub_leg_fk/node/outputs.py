@@ -57,7 +57,9 @@ class Outputs:
     def publish(self, vectors: Sequence[Ready]) -> None:
         """Publish what one message has made ready."""
         if self._configuration.stamp_now:
-            sec, nanosec = divmod(self._node.get_clock().now().nanoseconds, 1_000_000_000)
+            sec, nanosec = divmod(
+                self._node.get_clock().now().nanoseconds, 1_000_000_000
+            )
             vectors = [replace(vector, sec=sec, nanosec=nanosec) for vector in vectors]
         self._stream.send(vectors)
         if self._wants_skeletons:
@@ -79,7 +81,8 @@ class Outputs:
             twist = self._sender(_twist_topic(chain))
             senders[chain.name] = Senders(pose, twist)
         self._stream = PoseStream(
-            configuration.chains, configuration.frame_prefix, senders, self._sender(_TF))
+            configuration.chains, configuration.frame_prefix, senders, self._sender(_TF)
+        )
         self._wants_skeletons = self._is_wanted(_SKELETON)
 
     def _create(self, topic: str, message_type: Any) -> Publisher:
@@ -90,7 +93,8 @@ class Outputs:
             options = {}
         if self._events_supported:
             options['event_callbacks'] = PublisherEventCallbacks(
-                matched=lambda info: self._connect())
+                matched=lambda info: self._connect()
+            )
         try:
             return self._node.create_publisher(message_type, topic, qos, **options)
         except UnsupportedEventTypeError:
@@ -108,7 +112,9 @@ class Outputs:
         publisher = self._publishers.get(topic)
         if publisher is None:
             return False
-        for_late_ones = publisher.qos_profile.durability is DurabilityPolicy.TRANSIENT_LOCAL
+        for_late_ones = (
+            publisher.qos_profile.durability is DurabilityPolicy.TRANSIENT_LOCAL
+        )
         if for_late_ones or not self._events_supported:
             return True
         return bool(publisher.get_subscription_count())
@@ -140,4 +146,5 @@ def _topics(configuration: Configuration) -> dict[str, Any]:
 def _tf_message() -> Any:
     """Return the type of messages on /tf; PyPI lacks it, and `publish_tf` is refused there."""
     from tf2_msgs.msg import TFMessage
+
     return TFMessage

@@ -10,12 +10,20 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions, QoSPolicyKind
 
 PREFIX = 'qos_overrides.'
-OVERRIDABLE = QoSOverridingOptions(policy_kinds=(
-    QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY,
-    QoSPolicyKind.DURABILITY))
+OVERRIDABLE = QoSOverridingOptions(
+    policy_kinds=(
+        QoSPolicyKind.HISTORY,
+        QoSPolicyKind.DEPTH,
+        QoSPolicyKind.RELIABILITY,
+        QoSPolicyKind.DURABILITY,
+    )
+)
 _LARGEST_DEPTH = 2**31 - 1
-_POLICIES = {'history': HistoryPolicy, 'reliability': ReliabilityPolicy,
-             'durability': DurabilityPolicy}
+_POLICIES = {
+    'history': HistoryPolicy,
+    'reliability': ReliabilityPolicy,
+    'durability': DurabilityPolicy,
+}
 
 
 class QoSOverrides:
@@ -51,14 +59,24 @@ class QoSOverrides:
         _, _, policy = _parts(name)
         if policy == 'depth':
             if type(value) is not int or not 1 <= value <= _LARGEST_DEPTH:
-                raise ParameterError(name, f'found {value!r}, allowed: an integer from 1 to '
-                                     f'{_LARGEST_DEPTH}')
+                raise ParameterError(
+                    name,
+                    f'found {value!r}, allowed: an integer from 1 to {_LARGEST_DEPTH}',
+                )
             return
         if policy not in _POLICIES:
-            raise ParameterError(name, f'no such policy; allowed: depth, {", ".join(_POLICIES)}')
-        choices = [choice.name.lower() for choice in _POLICIES[policy] if choice.name != 'UNKNOWN']
+            raise ParameterError(
+                name, f'no such policy; allowed: depth, {", ".join(_POLICIES)}'
+            )
+        choices = [
+            choice.name.lower()
+            for choice in _POLICIES[policy]
+            if choice.name != 'UNKNOWN'
+        ]
         if value not in choices:
-            raise ParameterError(name, f'found {value!r}, allowed: {" or ".join(choices)}')
+            raise ParameterError(
+                name, f'found {value!r}, allowed: {" or ".join(choices)}'
+            )
 
 
 def _parts(name: str) -> tuple[str, str, str]:

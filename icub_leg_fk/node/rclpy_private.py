@@ -16,7 +16,9 @@ from rclpy.publisher import Publisher
 
 def raw_publish(publisher: Publisher) -> Callable[[bytes], None]:
     """Return what publishes the bytes of a message, fast."""
-    publish: Callable[[bytes], None] = getattr(publisher.handle, 'publish_raw', publisher.publish)
+    publish: Callable[[bytes], None] = getattr(
+        publisher.handle, 'publish_raw', publisher.publish
+    )
     return publish
 
 

@@ -6,20 +6,22 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
+from icub_leg_fk.stream.colors import color_of
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 _BONE_WIDTH = 0.012  # m
 _JOINT_DIAMETER = 0.03  # m
 _SOLE_WIDTH = 0.006  # m
-_BONE_COLOR = ColorRGBA(r=0.75, g=0.75, b=0.78, a=1.0)
-_JOINT_COLOR = ColorRGBA(r=0.0, g=0.45, b=0.70, a=1.0)
-_SOLE_COLOR = ColorRGBA(r=0.90, g=0.60, b=0.0, a=1.0)
+_NAME_HEIGHT = 0.04  # m; of its letters
+_NAME_BELOW = 0.08  # m; of its middle below the tip
+_JOINT_COLOR = ColorRGBA(r=0.75, g=0.75, b=0.78, a=1.0)
 
 
-def skeleton_markers(chain: Chain, q: Sequence[float], stamp: Time, frame_prefix: str
-                     ) -> MarkerArray:
-    """Return a line through the origins of the chain's frames, a ball at each, and the sole.
+def skeleton_markers(
+    chain: Chain, q: Sequence[float], stamp: Time, frame_prefix: str
+) -> MarkerArray:
+    """Return a line through the chain's frames, a ball at each, the tip's name and the sole.
 
     Args:
         chain: the chain.
@@ -27,18 +29,21 @@ def skeleton_markers(chain: Chain, q: Sequence[float], stamp: Time, frame_prefix
         stamp: stamp of the markers.
         frame_prefix: put before the root frame's id.
     """
+    color = _color(chain)
     origins = [Point(), *_points(chain.frames(q)[:, :3, 3])]
-    bones = _line(0, origins, _BONE_WIDTH, _BONE_COLOR)
-    balls = Marker(id=1, type=Marker.SPHERE_LIST, color=_JOINT_COLOR, points=origins)
-    balls.scale.x = balls.scale.y = balls.scale.z = _JOINT_DIAMETER
-    markers = [bones, balls]
+    markers = [
+        _line(origins, _BONE_WIDTH, color),
+        _balls(origins, _JOINT_DIAMETER, _JOINT_COLOR),
+        _name(chain.tip, origins[-1], color),
+    ]
     corners = chain.sole_outline(q)
     if corners is not None:
         points = _points(corners)
-        markers.append(_line(2, [*points, points[0]], _SOLE_WIDTH, _SOLE_COLOR))
-    for marker in markers:
+        markers.append(_line([*points, points[0]], _SOLE_WIDTH, color))
+    for number, marker in enumerate(markers):
         marker.header = Header(stamp=stamp, frame_id=frame_prefix + chain.root_frame)
         marker.ns = chain.name
+        marker.id = number
         marker.action = Marker.ADD
         marker.pose.orientation.w = 1.0
     return MarkerArray(markers=markers)
@@ -49,12 +54,30 @@ def no_skeletons() -> MarkerArray:
     return MarkerArray(markers=[Marker(action=Marker.DELETEALL)])
 
 
-def _line(number: int, points: list[Point], width: float, color: ColorRGBA) -> Marker:
-    marker = Marker(id=number, type=Marker.LINE_STRIP, color=color, points=points)
+def _line(points: list[Point], width: float, color: ColorRGBA) -> Marker:
+    marker = Marker(type=Marker.LINE_STRIP, points=points, color=color)
     marker.scale.x = width
+    return marker
+
+
+def _balls(points: list[Point], diameter: float, color: ColorRGBA) -> Marker:
+    marker = Marker(type=Marker.SPHERE_LIST, points=points, color=color)
+    marker.scale.x = marker.scale.y = marker.scale.z = diameter
+    return marker
+
+
+def _name(text: str, tip: Point, color: ColorRGBA) -> Marker:
+    marker = Marker(type=Marker.TEXT_VIEW_FACING, text=text, color=color)
+    marker.scale.z = _NAME_HEIGHT
+    marker.pose.position = Point(x=tip.x, y=tip.y, z=tip.z - _NAME_BELOW)
     return marker
 
 
 def _points(positions: Array) -> list[Point]:
     """Return (K, 3) positions as messages."""
     return [Point(x=x, y=y, z=z) for x, y, z in positions.tolist()]
+
+
+def _color(chain: Chain) -> ColorRGBA:
+    red, green, blue = bytes.fromhex(color_of(chain).removeprefix('#'))
+    return ColorRGBA(r=red / 255, g=green / 255, b=blue / 255, a=1.0)

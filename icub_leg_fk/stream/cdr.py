@@ -1,11 +1,12 @@
 """ROS messages to and from their CDR bytes (OMG CDR, as rosidl lays them out); free of rclpy.
 
-Read is sensor_msgs/JointState, bounds-checked, since its bytes come from the network: every length
-is compared with what is there before anything is read or allocated. Its fields are encapsulation
-(4 bytes), stamp sec and nanosec, frame_id, name[], position[], velocity[], effort[]; alignment
-counts from the fifth byte. Padding may hold anything: Fast CDR leaves in it what was in the buffer
-before. What Fast CDR takes and this refuses: encapsulations other than plain CDR, in which no ROS
-middleware sends a JointState; a string without NUL at its end, or with one before it.
+Read are sensor_msgs/JointState and std_msgs/String, bounds-checked, since their bytes come from
+the network: every length is compared with what is there before anything is read or allocated. The
+fields of a JointState are encapsulation (4 bytes), stamp sec and nanosec, frame_id, name[],
+position[], velocity[], effort[]; alignment counts from the fifth byte. Padding may hold anything:
+Fast CDR leaves in it what was in the buffer before. What Fast CDR takes and this refuses:
+encapsulations other than plain CDR, in which no ROS middleware sends these; a string without NUL
+at its end, or with one before it.
 
 Written are PoseStamped, TwistStamped and TFMessage, little-endian: all but stamps and numbers is
 prepared once.
@@ -13,7 +14,7 @@ prepared once.
 
 from collections.abc import Sequence
 import struct
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 from icub_leg_fk.errors import MalformedMessageError
 from icub_leg_fk.kinematics.solver import Pose
@@ -63,16 +64,35 @@ def read_layout(data: bytes) -> JointStateLayout:
         MalformedMessageError: the bytes end too early, a length is absurd, or the encoding is
             not plain CDR; names the field.
     """
-    reader = _Reader(data)
+    reader = _Reader(data, 'JointState')
     reader.take('header.stamp', 8)
     frame_id = reader.string('header.frame_id')
     # A string takes at least its length field: no more of them than a quarter of the rest.
     names = tuple([reader.string('name') for _ in range(reader.length('name', 4))])
     names_end = reader.align(4)
     padding = tuple(reader.padding)
-    positions, velocities, efforts = map(reader.doubles, ('position', 'velocity', 'effort'))
-    return JointStateLayout(reader.byte_order, frame_id, names, padding, names_end,
-                            positions, velocities, efforts)
+    positions, velocities, efforts = map(
+        reader.doubles, ('position', 'velocity', 'effort')
+    )
+    return JointStateLayout(
+        reader.byte_order,
+        frame_id,
+        names,
+        padding,
+        names_end,
+        positions,
+        velocities,
+        efforts,
+    )
+
+
+def read_string(data: bytes) -> bytes:
+    """Return the text of a serialized String, not decoded: XML itself says how.
+
+    Raises:
+        MalformedMessageError: the bytes are no String.
+    """
+    return _Reader(data, 'String').text('data')
 
 
 class _StampedEncoder:
@@ -135,13 +155,15 @@ class TFMessageEncoder:
 
 
 class _Reader:
-    """A position in the bytes of a JointState that refuses to move past their end."""
+    """A position in the bytes of a message that refuses to move past their end."""
 
-    def __init__(self, data: bytes) -> None:
+    def __init__(self, data: bytes, message: str) -> None:
+        self._message = message
         byte_order = BYTE_ORDERS.get(bytes(data[:2]))
         if byte_order is None:
-            raise MalformedMessageError('JointState', 'has the encapsulation '
-                                        f'0x{data[:2].hex()}; allowed: 0x0000, 0x0001')
+            self._fail(
+                f'has the encapsulation 0x{data[:2].hex()}; allowed: 0x0000, 0x0001'
+            )
         self.byte_order = byte_order
         self.padding: list[tuple[int, int]] = []
         self._data = data
@@ -160,30 +182,35 @@ class _Reader:
         start = self._at
         self._at = start + size
         if self._at > len(self._data):
-            raise MalformedMessageError('JointState', f'{field} ends at byte {self._at}; allowed: '
-                                        f'{len(self._data)}')
+            self._fail(f'{field} ends at byte {self._at}; allowed: {len(self._data)}')
         return start
 
     def length(self, field: str, item_size: int) -> int:
         """Return the count of items that follow; they fit in what is left."""
         self.align(4)
-        count: int = struct.unpack_from(f'{self.byte_order}I', self._data,
-                                        self.take(field, 4))[0]
+        count: int = struct.unpack_from(
+            f'{self.byte_order}I', self._data, self.take(field, 4)
+        )[0]
         left = len(self._data) - self._at
         if count * item_size > left:
-            raise MalformedMessageError('JointState', f'{field} has {count} items; allowed: what '
-                                        f'fits in the {left} bytes left')
+            self._fail(
+                f'{field} has {count} items; allowed: what fits in the {left} bytes left'
+            )
         return count
 
     def string(self, field: str) -> str:
         """Return the string that follows."""
+        return self.text(field).decode('utf-8', 'replace')
+
+    def text(self, field: str) -> bytes:
+        """Return the string that follows, not decoded."""
         size = self.length(field, 1)
         start = self.take(field, size)
-        text = self._data[start:self._at]
+        end = self._at
+        text = self._data[start:end]
         if size and text.find(0) != size - 1:
-            raise MalformedMessageError('JointState',
-                                        f'{field} is not a string that ends with NUL')
-        return text[:-1].decode('utf-8', 'replace')
+            self._fail(f'{field} is not a string that ends with NUL')
+        return text[:-1]
 
     def doubles(self, field: str) -> Doubles:
         """Pass over a sequence of numbers."""
@@ -192,6 +219,9 @@ class _Reader:
             self.align(8)
         return Doubles(self.take(field, 8 * count), count)
 
+    def _fail(self, fault: str) -> NoReturn:
+        raise MalformedMessageError(self._message, fault)
+
 
 def _string(text: str) -> bytes:
     """Return the bytes of a string: length, text and NUL."""
@@ -199,6 +229,6 @@ def _string(text: str) -> bytes:
     return struct.pack('<I', len(data)) + data
 
 
-def _aligned(before: int, data: bytes, size: int) -> bytes:
-    """Return data that starts after so many bytes, padded for items of a size to follow."""
-    return data + bytes(-(before + len(data)) % size)
+def _aligned(offset: int, data: bytes, size: int) -> bytes:
+    """Return data that starts at an offset, padded so that items of `size` may follow."""
+    return data + bytes(-(offset + len(data)) % size)

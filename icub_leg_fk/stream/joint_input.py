@@ -4,7 +4,7 @@ The rules:
 
 - Joints are matched by name; joints of no chain are ignored.
 - A message that brings some of a chain's joints updates those. The chain is then ready if each of
-  its joints is known, finite and no older than the joint timeout beside the newest of them.
+  its joints is known, finite and lags the newest of them by no more than the joint timeout.
   (Finite is what leaves room to compute with: less than `LARGEST_VALUE`.)
 - A message is rejected as a whole if `position` is not as long as `name`, or a name appears twice;
   an empty `position` is counted only. Velocities are unknown unless they are as many as the names.
@@ -142,7 +142,9 @@ class _Brought:
     velocities: tuple[float, ...] | None
 
     def velocity(self, joint: str) -> float:
-        return _UNKNOWN if self.velocities is None else self.velocities[self.places[joint]]
+        return (
+            _UNKNOWN if self.velocities is None else self.velocities[self.places[joint]]
+        )
 
 
 class JointInput:
@@ -164,8 +166,9 @@ class JointInput:
         self._states: list[_ChainState] = []
         self.configure((), 0.0)
 
-    def configure(self, chains: Sequence[Chain], joint_timeout: float, velocities: bool = False
-                  ) -> None:
+    def configure(
+        self, chains: Sequence[Chain], joint_timeout: float, velocities: bool = False
+    ) -> None:
         """Begin to work for some chains, with the joints that are held and what was counted.
 
         Args:
@@ -198,8 +201,11 @@ class JointInput:
         if sec == 0 and nanosec == 0:
             sec, nanosec = divmod(self._now(), _SECOND)
         if sec > _LAST_SECOND:  # a bag may say that it was recorded then
-            self._reject('malformed', f'it has no stamp, and the time is {sec} s; allowed: up to '
-                         f'{_LAST_SECOND} s')
+            self._reject(
+                'malformed',
+                f'it has no stamp, and the time is {sec} s; allowed: up to '
+                f'{_LAST_SECOND} s',
+            )
             return []
         brought = self._hold(form, sec * _SECOND + nanosec, data)
         ready = []
@@ -211,7 +217,9 @@ class JointInput:
                 state.look.silent += 1
                 continue
             state.look.ready += 1
-            qdot = self._velocities(state, brought, pick) if self._wants_velocities else None
+            qdot = None
+            if self._wants_velocities:
+                qdot = self._velocities(state, brought, pick)
             ready.append(Ready(state.chain, sec, nanosec, q, qdot))
         return ready
 
@@ -278,7 +286,9 @@ class JointInput:
         newest = max([held[joint].stamp for joint in state.joints if joint in held])
         found: defaultdict[str, dict[str, float]] = defaultdict(dict)
         positions = []
-        for joint, (lower, upper), link in zip(state.joints, state.ranges, state.chain.joints):
+        for joint, (lower, upper), link in zip(
+            state.joints, state.ranges, state.chain.joints
+        ):
             if joint not in held:
                 found['missing_joint'][joint] = _UNKNOWN
                 continue
@@ -296,8 +306,9 @@ class JointInput:
             state.look.note(reason, found[reason])
         return None if reasons else tuple(positions)
 
-    def _velocities(self, state: _ChainState, brought: _Brought, pick: Pick | None
-                    ) -> tuple[float, ...] | None:
+    def _velocities(
+        self, state: _ChainState, brought: _Brought, pick: Pick | None
+    ) -> tuple[float, ...] | None:
         """Return the velocities of a chain's joints; None, which is noted, if one is unknown."""
         if pick is None or brought.velocities is None:
             qdot = tuple([self._held[joint].velocity(joint) for joint in state.joints])
@@ -305,8 +316,11 @@ class JointInput:
             qdot = pick(brought.velocities)
         if _are_usable(qdot):
             return qdot
-        bad = {joint: value for joint, value in zip(state.joints, qdot)
-               if not abs(value) < LARGEST_VALUE}
+        bad = {
+            joint: value
+            for joint, value in zip(state.joints, qdot)
+            if not abs(value) < LARGEST_VALUE
+        }
         state.look.note('no_velocity', bad)
         return None
 
@@ -330,14 +344,16 @@ class _ChainState:
         return True
 
 
-def _faults(position: float, lower: float, upper: float, link: DHLink) -> tuple[str, ...]:
+def _faults(
+    position: float, lower: float, upper: float, link: DHLink
+) -> tuple[str, ...]:
     """Return what is the matter with a position that is out of range."""
     if not abs(position) < LARGEST_VALUE:
-        return 'non_finite',
+        return ('non_finite',)
     beyond = max(lower - position, position - upper)
     if beyond > _TURN and abs(position) > _TURN and not link.is_prismatic:
         return 'looks_like_degrees', 'out_of_range'
-    return 'out_of_range',
+    return ('out_of_range',)
 
 
 def _are_usable(values: Sequence[float]) -> bool:

@@ -37,14 +37,16 @@ class JointStateReader:
         """Return the form of a message: remembered, or read anew.
 
         Raises:
-            MalformedMessageError: the bytes are no JointState.
+            MalformedMessageError: the bytes are not a JointState.
         """
         for form in self._forms:
             if form.fits(data):
                 if form is not self._forms[0]:
                     self._put_first(form)
                 return form
-        form = self._form_but_for_padding(data) or Form(data, read_layout(data), self._chains)
+        form = self._form_but_for_padding(data) or Form(
+            data, read_layout(data), self._chains
+        )
         self._put_first(form)
         return form
 
@@ -78,8 +80,9 @@ class Form:
         look: the last look in which such a message was met; for whoever wants to meet it once.
     """
 
-    def __init__(self, data: bytes, layout: JointStateLayout,
-                 chains: Mapping[Any, Sequence[str]]) -> None:
+    def __init__(
+        self, data: bytes, layout: JointStateLayout, chains: Mapping[Any, Sequence[str]]
+    ) -> None:
         self.frame_id = layout.frame_id
         self.names = layout.names
         self.names_end = layout.names_end
@@ -97,15 +100,19 @@ class Form:
 
     def _remember_head(self, data: bytes, layout: JointStateLayout) -> None:
         """Remember what a message begins with, its padding masked."""
-        mask = bytearray(b'\xff' * layout.names_end)
+        names_end = layout.names_end
+        mask = bytearray(b'\xff' * names_end)
         for at, size in layout.padding:
-            mask[at:at + size] = bytes(size)
+            end = at + size
+            mask[at:end] = bytes(size)
         self._mask = int.from_bytes(mask[STAMP_END:], 'little')
-        self._head = data[STAMP_END:layout.names_end]
+        self._head = data[STAMP_END:names_end]
         self._masked_head = int.from_bytes(self._head, 'little') & self._mask
         self._encapsulation = data[:2]
 
-    def _remember_numbers(self, layout: JointStateLayout, indices: Sequence[int]) -> None:
+    def _remember_numbers(
+        self, layout: JointStateLayout, indices: Sequence[int]
+    ) -> None:
         """Remember where the numbers lie, and how to unpack those of some indices."""
         order = layout.byte_order
         sequences = (layout.positions, layout.velocities, layout.efforts)
@@ -129,7 +136,8 @@ class Form:
             data.startswith(self._head, STAMP_END)
             and len(data) >= self._size
             and data[:2] == self._encapsulation
-            and self._read_counts(data, self.names_end) == self._counts)
+            and self._read_counts(data, self.names_end) == self._counts
+        )
 
     def fits_but_for_padding(self, data: bytes) -> bool:
         """Return whether a message has this form, whatever its padding holds.
@@ -137,7 +145,10 @@ class Form:
         Fast CDR leaves in it what was in its buffer before; the next message of the same publisher
         likely has the same.
         """
-        head = data[STAMP_END:self.names_end]
+        if len(data) < self._size:
+            return False
+        end = self.names_end
+        head = data[STAMP_END:end]
         if int.from_bytes(head, 'little') & self._mask != self._masked_head:
             return False
         self._head = head
@@ -160,15 +171,19 @@ def _fault(layout: JointStateLayout) -> tuple[str, str] | None:
     if positions == 0:
         return 'empty_position', 'position is empty'
     if positions != len(names):
-        return 'position_length', f'position has {positions} values for {len(names)} names'
+        return (
+            'position_length',
+            f'position has {positions} values for {len(names)} names',
+        )
     name, count = Counter(names).most_common(1)[0]
     if count > 1:
         return 'duplicate_name', f'name {name[:60]!r} appears twice'
     return None
 
 
-def _picks(chains: Mapping[Any, Sequence[str]], places: Mapping[str, int]
-           ) -> tuple[tuple[Any, Pick | None], ...]:
+def _picks(
+    chains: Mapping[Any, Sequence[str]], places: Mapping[str, int]
+) -> tuple[tuple[Any, Pick | None], ...]:
     """Return the chains that have joints in some places, with what picks all of them there."""
     picks = []
     for chain, joint_names in chains.items():

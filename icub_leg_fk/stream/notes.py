@@ -14,6 +14,7 @@ from icub_leg_fk.stream.joint_input import ChainLook, Look, TIME_JUMP
 
 INFO = 'info'
 WARNING = 'warning'
+ERROR = 'error'
 
 _NAMES_SHOWN = 12
 _LONGEST_SHOWN = 40  # characters of a name
@@ -24,8 +25,8 @@ _FORMATS = {
     'stale_joint': '{:.3f} s old',
     'non_finite': '{}',
     'no_velocity': '{}',
-    'out_of_range': '{:.6g}',
     'looks_like_degrees': '{:.6g}',
+    'out_of_range': '{:.6g}',
 }
 """How what was found of a joint is written, by reason."""
 
@@ -36,7 +37,7 @@ class Note(NamedTuple):
     Attributes:
         key: what it is about, such as `stale_joint`: the same as long as it lasts.
         chain: name of the chain that it is about; empty if it is about all messages.
-        level: INFO or WARNING.
+        level: INFO, WARNING or ERROR.
         text: what there is to say, in a line that does not name the chain.
     """
 
@@ -49,12 +50,13 @@ class Note(NamedTuple):
         return f'{self.chain}: {self.text}' if self.chain else self.text
 
 
-def notes_of(look: Look, topic: str = '') -> list[Note]:
+def notes_of(look: Look, topic: str = '', joint_prefix: str = '') -> list[Note]:
     """Return what there is to say of what happened since the last look.
 
     Args:
         look: what happened.
         topic: the topic on which the messages came; empty if they came otherwise.
+        joint_prefix: what is before the joint names of the chains.
     """
     on_topic = f' on {topic}' if topic else ''
     texts = dict(_of_messages(look, on_topic))
@@ -62,7 +64,7 @@ def notes_of(look: Look, topic: str = '') -> list[Note]:
     for name, chain_look in look.chains.items():
         texts = dict(_of_chain(chain_look))
         texts.update(_of_frame_ids(look, chain_look))
-        texts.update(_of_names(look, chain_look, on_topic))
+        texts.update(_of_names(look, chain_look, on_topic, joint_prefix))
         notes += [Note(key, name, WARNING, texts[key]) for key in texts]
     return notes
 
@@ -97,18 +99,25 @@ def _of_messages(look: Look, on_topic: str) -> Iterator[tuple[str, str]]:
     jumps = look.rejected[TIME_JUMP]
     where = look.faults.get(TIME_JUMP)
     if jumps >= _MANY_JUMPS and jumps * _LOOP > look.messages:
-        yield 'many_time_jumps', (
-            f'time stepped back {jumps} times in {look.messages} messages, last to {where}: do '
-            'several publishers bring the same joints?')
+        yield (
+            'many_time_jumps',
+            (
+                f'time stepped back {jumps} times in {look.messages} messages, last to {where}: '
+                'do several publishers bring the same joints?'
+            ),
+        )
     elif jumps:
         times = f' {jumps} times, last' if jumps > 1 else ''
-        yield TIME_JUMP, f'time stepped back{times} to {where}; held joints are forgotten'
+        yield (
+            TIME_JUMP,
+            f'time stepped back{times} to {where}; held joints are forgotten',
+        )
 
 
 def _of_chain(look: ChainLook) -> Iterator[tuple[str, str]]:
     """Yield keys and texts of what there is to say of a chain's joints."""
-    for reason, joints in look.joints.items():
-        words = listed(reason, joints)
+    for reason in [reason for reason in _FORMATS if reason in look.joints]:
+        words = listed(reason, look.joints[reason])
         messages = _messages(look.held_back[reason])
         if reason == 'out_of_range':
             yield reason, f'out of range: {words}'
@@ -123,26 +132,47 @@ def _of_chain(look: ChainLook) -> Iterator[tuple[str, str]]:
 def _of_frame_ids(look: Look, chain_look: ChainLook) -> Iterator[tuple[str, str]]:
     """Yield a warning of a joint that comes under several frame ids."""
     for joint in chain_look.chain.joint_names:
-        frame_ids = [repr(name) for name, joints in look.frame_ids.items() if joint in joints]
+        frame_ids = [
+            repr(name) for name, joints in look.frame_ids.items() if joint in joints
+        ]
         if len(frame_ids) > 1:
-            yield 'frame_ids', (
-                f'{joint} comes under the frame ids {" and ".join(frame_ids)}: from '
-                f'{len(frame_ids)} robots?')
+            yield (
+                'frame_ids',
+                (
+                    f'{joint} comes under the frame ids {" and ".join(frame_ids)}: from '
+                    f'{len(frame_ids)} robots?'
+                ),
+            )
             return
 
 
-def _of_names(look: Look, chain_look: ChainLook, on_topic: str) -> Iterator[tuple[str, str]]:
+def _of_names(
+    look: Look, chain_look: ChainLook, on_topic: str, joint_prefix: str
+) -> Iterator[tuple[str, str]]:
     """Yield a warning if no joint of a chain has come."""
     joints = chain_look.chain.joint_names
     if not look.names or not look.joints.isdisjoint(joints):
         return
-    pair = _near(joints, look.names)
-    hint = ''
-    if pair:
-        hint = f'; {pair[0]!r} is nearly {pair[1]!r}, but names must be equal'
-    yield 'no_match', (
-        f'no message{on_topic} has one of its joints ({", ".join(joints)}); names that came: '
-        f'{names_that_came(look)}{hint}')
+    yield (
+        'no_match',
+        (
+            f'no message{on_topic} has one of its joints ({", ".join(joints)}); names that came: '
+            f'{names_that_came(look)}{_hint(joints, look.names, joint_prefix)}'
+        ),
+    )
+
+
+def _hint(joints: Sequence[str], names: Iterable[str], joint_prefix: str) -> str:
+    """Return what may help where no name is that of a joint; empty if nothing is like one."""
+    bare = [joint.removeprefix(joint_prefix) for joint in joints]
+    pair = _near(bare, names)
+    if not pair:
+        return ''
+    name, joint = pair
+    if name.endswith(joint):
+        prefix = name.removesuffix(joint) or '""'
+        return f'; {name!r} is looked for with joint_prefix:={prefix}'
+    return f'; {name!r} is nearly {joint_prefix + joint!r}, but names must be equal'
 
 
 def _near(joints: Sequence[str], names: Iterable[str]) -> tuple[str, str] | None:

@@ -8,7 +8,11 @@ from typing import NamedTuple
 
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.solver import Pose
-from icub_leg_fk.stream.cdr import PoseStampedEncoder, TFMessageEncoder, TwistStampedEncoder
+from icub_leg_fk.stream.cdr import (
+    PoseStampedEncoder,
+    TFMessageEncoder,
+    TwistStampedEncoder,
+)
 from icub_leg_fk.stream.joint_input import Ready
 
 Send = Callable[[bytes], None]
@@ -31,16 +35,22 @@ class PoseStream:
         send_tf: what takes one TFMessage per message of joint states; None if nobody listens.
     """
 
-    def __init__(self, chains: Sequence[Chain], frame_prefix: str,
-                 senders: Mapping[str, Senders], send_tf: Send | None) -> None:
+    def __init__(
+        self,
+        chains: Sequence[Chain],
+        frame_prefix: str,
+        senders: Mapping[str, Senders],
+        send_tf: Send | None,
+    ) -> None:
         self._send_tf = send_tf
         self._outputs: dict[str, _Output] = {}
         self._frames: dict[str, tuple[str, str]] = {}
         for chain in chains:
             root = frame_prefix + chain.root_frame
             self._frames[chain.name] = root, frame_prefix + chain.frame_id
-            self._outputs[chain.name] = _Output(chain, root, senders[chain.name],
-                                                is_in_tf=send_tf is not None)
+            self._outputs[chain.name] = _Output(
+                chain, root, senders[chain.name], is_in_tf=send_tf is not None
+            )
         self._tf_encoders: dict[tuple[str, ...], TFMessageEncoder] = {}
 
     def send(self, vectors: Iterable[Ready]) -> None:
@@ -65,7 +75,9 @@ class PoseStream:
 class _Output:
     """What becomes of one chain's joint vectors."""
 
-    def __init__(self, chain: Chain, root_frame: str, senders: Senders, is_in_tf: bool) -> None:
+    def __init__(
+        self, chain: Chain, root_frame: str, senders: Senders, is_in_tf: bool
+    ) -> None:
         self._chain = chain
         self._send_pose, self._send_twist = senders
         self._needs_pose = is_in_tf or self._send_pose is not None

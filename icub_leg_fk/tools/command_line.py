@@ -19,8 +19,13 @@ _NEGATIVE_NUMBER = re.compile(r'-(\.?\d|inf|nan)', re.IGNORECASE)
 class HelpFormatter(argparse.RawDescriptionHelpFormatter):
     """Shows a usage line that works as typed: options, which may take many words, come last."""
 
-    def add_usage(self, usage: str | None, actions: Iterable[argparse.Action],
-                  groups: Iterable[Any], prefix: str | None = None) -> None:
+    def add_usage(
+        self,
+        usage: str | None,
+        actions: Iterable[argparse.Action],
+        groups: Iterable[Any],
+        prefix: str | None = None,
+    ) -> None:
         """Add the usage line: arguments, what must be given, and a word for the options."""
         super().add_usage(usage or _usage(list(actions), groups), (), (), prefix)
 
@@ -57,7 +62,11 @@ class Parser(argparse.ArgumentParser):
 def _usage(actions: Sequence[argparse.Action], groups: Iterable[Any]) -> str:
     words = ['%(prog)s']
     words += [_argument(action) for action in actions if not action.option_strings]
-    words += [_option(action) for action in actions if action.option_strings and action.required]
+    words += [
+        _option(action)
+        for action in actions
+        if action.option_strings and action.required
+    ]
     for group in groups:
         if group.required:
             choices = [_option(action) for action in group._group_actions]

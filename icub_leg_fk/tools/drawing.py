@@ -17,8 +17,9 @@ from typing import Any, TYPE_CHECKING
 from icub_leg_fk.errors import LegFKError, MissingDependencyError, OutputFileError
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
+from icub_leg_fk.stream.colors import color_of
 from icub_leg_fk.tools.output_file import check_target, whole_path
-from icub_leg_fk.tools.space import Box, color_of, FAINT, GRID, Space
+from icub_leg_fk.tools.space import Box, FAINT, GRID, Space
 from icub_leg_fk.tools.tracks import ChainTrack, COORDINATES, OutOfRange, time_span
 import numpy as np
 

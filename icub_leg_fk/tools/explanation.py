@@ -24,7 +24,11 @@ import numpy as np
 _FACTORS = {'standard': ('Rz', 'tz', 'tx', 'Rx'), 'modified': ('Rx', 'tx', 'Rz', 'tz')}
 
 # How the iCub's documentation calls the tips; another robot's are E and, for a second frame, S.
-_TIP_SYMBOLS = {'left_foot': ('Lf', 'Ls'), 'right_foot': ('Rf', 'Rs'), 'head_imu': ('Is', 'S')}
+_TIP_SYMBOLS = {
+    'left_foot': ('Lf', 'Ls'),
+    'right_foot': ('Rf', 'Rs'),
+    'head_imu': ('Is', 'S'),
+}
 
 _MOST_TWISTS = 2  # alphas that are not right angles, before a formula fills pages
 
@@ -144,7 +148,9 @@ class _Placed(NamedTuple):
     T: Array
 
 
-def explain(chain: Chain, q: Sequence[float] | None, *, exact: bool = False) -> Explanation:
+def explain(
+    chain: Chain, q: Sequence[float] | None, *, exact: bool = False
+) -> Explanation:
     """Work out the documented method for one chain.
 
     Args:
@@ -163,7 +169,9 @@ def explain(chain: Chain, q: Sequence[float] | None, *, exact: bool = False) -> 
     products = _running_products(rows, numbers)
     T_root_0 = _constant(chain.T_root_0, numbers)
     placed = _placed(chain)
-    tips = {f'T_{frame.before}{frame.name}': _constant(frame.T, numbers) for frame in placed}
+    tips = {
+        f'T_{frame.before}{frame.name}': _constant(frame.T, numbers) for frame in placed
+    }
     return Explanation(
         chain=chain,
         tip=placed[-1].name if placed else _tip_symbols(chain)[0],
@@ -185,12 +193,15 @@ def unit(link: DHLink, radian: float = 1.0) -> float:
 
 def _refuse_pages(chain: Chain) -> None:
     """Refuse a formula whose entries would have thousands of characters."""
-    twists = [link.alpha for link in chain.links if abs(math.sin(2 * link.alpha)) > 1e-9]
+    twists = [
+        link.alpha for link in chain.links if abs(math.sin(2 * link.alpha)) > 1e-9
+    ]
     if len(twists) > _MOST_TWISTS:
         raise LegFKError(
             f'a formula of chain {chain.name} would fill pages, because {len(twists)} of its '
             f'alphas are not right angles (allowed: {_MOST_TWISTS}); give joint positions, such '
-            'as with --degrees')
+            'as with --degrees'
+        )
 
 
 def _positions(chain: Chain, q: Sequence[float] | None, numbers: Numbers) -> list[Cell]:
@@ -204,7 +215,9 @@ def _positions(chain: Chain, q: Sequence[float] | None, numbers: Numbers) -> lis
     return positions
 
 
-def _rows(chain: Chain, positions: Sequence[Cell], numbers: Numbers) -> list[ExplainedRow]:
+def _rows(
+    chain: Chain, positions: Sequence[Cell], numbers: Numbers
+) -> list[ExplainedRow]:
     rows = []
     for index, row in enumerate(chain.rows()):
         link = row.link
@@ -224,15 +237,20 @@ def _rows(chain: Chain, positions: Sequence[Cell], numbers: Numbers) -> list[Exp
     return rows
 
 
-def _basic_transforms(theta: Cell, d: Cell, a: Cell, alpha: Cell,
-                      numbers: Numbers) -> dict[str, Matrix]:
+def _basic_transforms(
+    theta: Cell, d: Cell, a: Cell, alpha: Cell, numbers: Numbers
+) -> dict[str, Matrix]:
     ct, st = numbers.cos_sin(theta)
     ca, sa = numbers.cos_sin(alpha)
     return {
-        'Rz': numbers.matrix([[ct, -st, 0, 0], [st, ct, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]),
+        'Rz': numbers.matrix(
+            [[ct, -st, 0, 0], [st, ct, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+        ),
         'tz': numbers.matrix([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, d], [0, 0, 0, 1]]),
         'tx': numbers.matrix([[1, 0, 0, a], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]),
-        'Rx': numbers.matrix([[1, 0, 0, 0], [0, ca, -sa, 0], [0, sa, ca, 0], [0, 0, 0, 1]]),
+        'Rx': numbers.matrix(
+            [[1, 0, 0, 0], [0, ca, -sa, 0], [0, sa, ca, 0], [0, 0, 0, 1]]
+        ),
     }
 
 
@@ -262,15 +280,19 @@ def _placed(chain: Chain) -> list[_Placed]:
     return [frame for frame in frames if not np.array_equal(frame.T, np.eye(4))]
 
 
-def _frames(chain: Chain, q: Sequence[float] | Array,
-            placed: Sequence[_Placed]) -> dict[str, Array]:
+def _frames(
+    chain: Chain, q: Sequence[float] | Array, placed: Sequence[_Placed]
+) -> dict[str, Array]:
     """Return all frames in the root frame by name, with their origins in mm."""
     *frames, _ = chain.frames(q)
     for frame in placed:
         frames.append(frames[-1] @ frame.T)
     for T in frames:
         T[:3, 3] *= MM
-    names = [*map(str, range(len(frames) - len(placed))), *(frame.name for frame in placed)]
+    names = [
+        *map(str, range(len(frames) - len(placed))),
+        *(frame.name for frame in placed),
+    ]
     return dict(zip(names, frames, strict=True))
 
 

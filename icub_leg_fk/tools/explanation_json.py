@@ -12,25 +12,27 @@ import numpy as np
 def as_json(e: Explanation) -> str:
     """Return the explanation as JSON; exact numbers and formulas are strings that sympy reads."""
     chain = e.chain
-    return text.as_json({
-        'chain': chain.name,
-        'version': chain.version,
-        'source': chain.source,
-        'root_frame': chain.root_frame,
-        'frame_id': chain.frame_id,
-        'units': {'length': 'mm', 'angle': 'rad'},
-        'convention': chain.convention,
-        'joints': list(chain.joint_names),
-        'joint_positions': _joint_positions(e),
-        'symbols': {name: str(meaning) for name, meaning in e.symbols.items()},
-        'frames': [_frame(T) for T in e.frames.values()],
-        'frame_names': list(e.frames),
-        'links': [_link(row) for row in e.rows],
-        'running_products': [_matrix(T) for T in e.products],
-        'T_root_0': _matrix(e.T_root_0),
-        'after_last_link': {name: _matrix(T) for name, T in e.tips.items()},
-        'T_root_tip': _matrix(e.T_root_tip),
-    })
+    return text.as_json(
+        {
+            'chain': chain.name,
+            'version': chain.version,
+            'source': chain.source,
+            'root_frame': chain.root_frame,
+            'frame_id': chain.frame_id,
+            'units': {'length': 'mm', 'angle': 'rad'},
+            'convention': chain.convention,
+            'joints': list(chain.joint_names),
+            'joint_positions': _joint_positions(e),
+            'symbols': {name: str(meaning) for name, meaning in e.symbols.items()},
+            'frames': [_frame(T) for T in e.frames.values()],
+            'frame_names': list(e.frames),
+            'links': [_link(row) for row in e.rows],
+            'running_products': [_matrix(T) for T in e.products],
+            'T_root_0': _matrix(e.T_root_0),
+            'after_last_link': {name: _matrix(T) for name, T in e.tips.items()},
+            'T_root_tip': _matrix(e.T_root_tip),
+        }
+    )
 
 
 def _joint_positions(e: Explanation) -> list[float] | None:
@@ -66,7 +68,9 @@ def _range(row: ExplainedRow, limits: tuple[float, float]) -> list[float | None]
     """Return the limits of a row's joint, None for one that there is not."""
     if not row.row.is_first or limits == (-math.inf, math.inf):
         return None
-    return [unit(row.link) * limit if math.isfinite(limit) else None for limit in limits]
+    return [
+        unit(row.link) * limit if math.isfinite(limit) else None for limit in limits
+    ]
 
 
 def _matrix(T: Matrix) -> list[list[float | str]]:

@@ -24,21 +24,53 @@ import numpy as np
 
 _GENERAL = {
     'standard': [
-        ['cos theta_i', '-sin theta_i cos alpha_i', 'sin theta_i sin alpha_i', 'a_i cos theta_i'],
-        ['sin theta_i', 'cos theta_i cos alpha_i', '-cos theta_i sin alpha_i', 'a_i sin theta_i'],
+        [
+            'cos theta_i',
+            '-sin theta_i cos alpha_i',
+            'sin theta_i sin alpha_i',
+            'a_i cos theta_i',
+        ],
+        [
+            'sin theta_i',
+            'cos theta_i cos alpha_i',
+            '-cos theta_i sin alpha_i',
+            'a_i sin theta_i',
+        ],
         ['0', 'sin alpha_i', 'cos alpha_i', 'd_i'],
         ['0', '0', '0', '1'],
     ],
     'modified': [
         ['cos theta_i', '-sin theta_i', '0', 'a_i'],
-        ['sin theta_i cos alpha_i', 'cos theta_i cos alpha_i', '-sin alpha_i', '-d_i sin alpha_i'],
-        ['sin theta_i sin alpha_i', 'cos theta_i sin alpha_i', 'cos alpha_i', 'd_i cos alpha_i'],
+        [
+            'sin theta_i cos alpha_i',
+            'cos theta_i cos alpha_i',
+            '-sin alpha_i',
+            '-d_i sin alpha_i',
+        ],
+        [
+            'sin theta_i sin alpha_i',
+            'cos theta_i sin alpha_i',
+            'cos alpha_i',
+            'd_i cos alpha_i',
+        ],
         ['0', '0', '0', '1'],
     ],
 }
 _DEGREE = math.degrees(1)  # per radian
-_PARAMETERS = {'Rz': 'theta', 'tz': 'd', 'tx': 'a', 'Rx': 'alpha'}  # of the basic transforms
-_HEADER = ('Link `i`', '`a_i` (mm)', '`d_i` (mm)', '`alpha_i` (rad)', '`theta_i` (deg)', 'joint')
+_PARAMETERS = {
+    'Rz': 'theta',
+    'tz': 'd',
+    'tx': 'a',
+    'Rx': 'alpha',
+}  # of the basic transforms
+_HEADER = (
+    'Link `i`',
+    '`a_i` (mm)',
+    '`d_i` (mm)',
+    '`alpha_i` (rad)',
+    '`theta_i` (deg)',
+    'joint',
+)
 
 
 @dataclass(frozen=True)
@@ -81,14 +113,18 @@ class Equation:
 
 @dataclass(frozen=True)
 class Entries:
-    """A name, and a transform that is too wide for a line; its entries are told one by one."""
+    """A name, and a transform that is too wide for a line; its entries are given one by one."""
 
     name: str
     T: Matrix
 
     def by_name(self) -> list[tuple[str, Cell]]:
         """Return the names of the entries with the entries, column by column."""
-        names = [f'r_{i}{j}' for j in (1, 2, 3) for i in (1, 2, 3)] + ['p_x', 'p_y', 'p_z']
+        names = [f'r_{i}{j}' for j in (1, 2, 3) for i in (1, 2, 3)] + [
+            'p_x',
+            'p_y',
+            'p_z',
+        ]
         return list(zip(names, np.array(self.T)[:3].T.ravel().tolist(), strict=True))
 
 
@@ -115,13 +151,20 @@ def steps(e: Explanation) -> Iterator[Block]:
 
 def _introduction(e: Explanation) -> Iterator[Block]:
     chain = e.chain
-    yield Heading(f'{chain.name}={chain.version}: the transform `T_Ro{e.tip}`   '
-                  f'(Ro = {chain.root_frame}, {e.tip} = {chain.frame_id})', is_title=True)
+    yield Heading(
+        f'{chain.name}={chain.version}: the transform `T_Ro{e.tip}`   '
+        f'(Ro = {chain.root_frame}, {e.tip} = {chain.frame_id})',
+        is_title=True,
+    )
     if chain.source:
         yield Note(f'Table from: {_free_text(chain.source)}')
     if e.q is None:
-        symbols = [f'`q_{joint}` ({name})' for joint, name in enumerate(chain.joint_names)]
-        yield Note(f'Joint positions: symbols {", ".join(symbols)}. Lengths in mm, angles in rad.')
+        symbols = [
+            f'`q_{joint}` ({name})' for joint, name in enumerate(chain.joint_names)
+        ]
+        yield Note(
+            f'Joint positions: symbols {", ".join(symbols)}. Lengths in mm, angles in rad.'
+        )
         return
     joints = zip(chain.joint_names, chain.joints, e.q, strict=True)
     values = [f'{name} {position(link, value)}' for name, link, value in joints]
@@ -130,8 +173,10 @@ def _introduction(e: Explanation) -> Iterator[Block]:
 
 def _z_axes(e: Explanation) -> Iterator[Block]:
     posture = 'q = 0' if e.q is None else 'this q'
-    yield Heading('Step 1. The z axis of each joint   '
-                  f'(coordinates in {e.chain.root_frame}, at {posture})')
+    yield Heading(
+        'Step 1. The z axis of each joint   '
+        f'(coordinates in {e.chain.root_frame}, at {posture})'
+    )
     remarks = [_motion(row) for row in e.rows]
     if e.is_modified:
         remarks.insert(0, 'no joint: frame 0')
@@ -141,15 +186,18 @@ def _z_axes(e: Explanation) -> Iterator[Block]:
 
 
 def _origins(e: Explanation) -> Iterator[Block]:
-    yield Heading('Step 2. The origin of each frame, on `z_i` where it meets '
-                  f'`{_other_axis(e)}`   (mm)')
+    yield Heading(
+        'Step 2. The origin of each frame, on `z_i` where it meets '
+        f'`{_other_axis(e)}`   (mm)'
+    )
     remarks = [_origin(e, i) for i in range(len(e.rows) + 1)]
     yield _vectors(e, 'o', 3, remarks)
 
 
 def _x_axes(e: Explanation) -> Iterator[Block]:
-    yield Heading('Step 3. The x axis of each frame, orthogonal to '
-                  f'`{_other_axis(e)}` and `z_i`')
+    yield Heading(
+        f'Step 3. The x axis of each frame, orthogonal to `{_other_axis(e)}` and `z_i`'
+    )
     remarks = [f'orthogonal to `z_{i}` and `z_{i + 1}`' for i in range(len(e.rows))]
     if e.is_modified:
         remarks.append('free')
@@ -159,7 +207,9 @@ def _x_axes(e: Explanation) -> Iterator[Block]:
 
 
 def _y_axes(e: Explanation) -> Iterator[Block]:
-    yield Heading('Step 4. The y axis of each frame, by the right-hand rule: `y_i = z_i x x_i`')
+    yield Heading(
+        'Step 4. The y axis of each frame, by the right-hand rule: `y_i = z_i x x_i`'
+    )
     yield _vectors(e, 'y', 1, [''] * (len(e.rows) + 1))
 
 
@@ -179,7 +229,9 @@ def _motion(row: ExplainedRow) -> str:
     if row.link.is_fixed:
         return 'a fixed row'
     mover = row.row.joint if row.row.is_first else f'a row that follows {row.row.joint}'
-    return f'{mover} slides along it' if row.link.is_prismatic else f'{mover} turns about it'
+    if row.link.is_prismatic:
+        return f'{mover} slides along it'
+    return f'{mover} turns about it'
 
 
 def _joint(row: Row) -> str:
@@ -200,7 +252,9 @@ def _origin(e: Explanation, i: int) -> str:
         return 'where the last row puts it'
     if not e.is_modified and i == 0:
         return 'where `T_Ro0` puts it'
-    other, link = (i + 1, e.rows[i].link) if e.is_modified else (i - 1, e.rows[i - 1].link)
+    other, link = (
+        (i + 1, e.rows[i].link) if e.is_modified else (i - 1, e.rows[i - 1].link)
+    )
     apart = f'{short(MM * abs(link.a))} mm away'
     is_parallel = abs(math.sin(link.alpha)) < 1e-12
     if is_parallel and link.a:
@@ -213,15 +267,22 @@ def _origin(e: Explanation, i: int) -> str:
 
 
 def _table(e: Explanation) -> Iterator[Block]:
-    yield Heading('Step 5. The Denavit-Hartenberg table, and each link as four basic transforms')
+    yield Heading(
+        'Step 5. The Denavit-Hartenberg table, and each link as four basic transforms'
+    )
     yield Table([_table_row(e, row) for row in e.rows], _HEADER)
-    ranges = [f'{row.row.joint} {joint_range(row.link)}' for row in e.rows
-              if row.link.robot_range and row.row.is_first]
+    ranges = [
+        f'{row.row.joint} {joint_range(row.link)}'
+        for row in e.rows
+        if row.link.robot_range and row.row.is_first
+    ]
     if ranges:
         yield Note(f'Ranges of robots, which count: {", ".join(ranges)}')
     for row in e.rows:
         if row.link.erratum:
-            yield Note(f'* `i = {row.index}` as printed: {_free_text(row.link.erratum)}')
+            yield Note(
+                f'* `i = {row.index}` as printed: {_free_text(row.link.erratum)}'
+            )
 
 
 def _table_row(e: Explanation, row: ExplainedRow) -> list[str]:
@@ -234,7 +295,11 @@ def _table_row(e: Explanation, row: ExplainedRow) -> list[str]:
         theta = f'{theta} {_moved(e, row)}'
     mark = ' *' if link.erratum else ''
     values = [short(MM * link.a), d, _in_pi(link.alpha), theta]
-    return [f'`i = {row.index}`{mark}', *(f'`{value}`' for value in values), _joint(row.row)]
+    return [
+        f'`i = {row.index}`{mark}',
+        *(f'`{value}`' for value in values),
+        _joint(row.row),
+    ]
 
 
 def _moved(e: Explanation, row: ExplainedRow) -> str:
@@ -255,17 +320,23 @@ def _general_row(e: Explanation) -> Iterator[Block]:
     yield Sentence(f'`A_i = T_i(i+1) = {_factors(e.rows[0], "i")}`')
     yield Equation('', [np.array(_GENERAL[e.chain.convention])])
     T = e.chain.T_n_tip
-    row = DHLink(a=T[0, 3], d=T[2, 3], alpha=math.atan2(T[2, 1], T[2, 2]), joint_type='fixed')
+    row = DHLink(
+        a=T[0, 3], d=T[2, 3], alpha=math.atan2(T[2, 1], T[2, 2]), joint_type='fixed'
+    )
     is_row = np.allclose(row.transform(), T) and not np.array_equal(T, np.eye(4))
     if is_row and not e.is_modified:
         a, d, alpha = short(MM * row.a), short(MM * row.d), _in_pi(row.alpha)
-        yield Sentence(f'`{next(iter(e.tips))}` equals a last fixed row: `a = {a}`, `d = {d}`, '
-                       f'`alpha = {alpha}`, `theta = 0`')
+        yield Sentence(
+            f'`{next(iter(e.tips))}` equals a last fixed row: `a = {a}`, `d = {d}`, '
+            f'`alpha = {alpha}`, `theta = 0`'
+        )
 
 
 def _legend(e: Explanation) -> Iterator[Block]:
     """Say what the symbols are."""
-    yield Sentence('In what follows `c_i = cos(theta_i)` and `s_i = sin(theta_i)`, with')
+    yield Sentence(
+        'In what follows `c_i = cos(theta_i)` and `s_i = sin(theta_i)`, with'
+    )
     meanings = {name: plain(meaning) for name, meaning in e.symbols.items()}
     meanings |= sums_of_angles([*e.products, e.T_root_tip])
     yield Table([[f'`{name}`', f'`= {meaning}`'] for name, meaning in meanings.items()])
@@ -273,9 +344,13 @@ def _legend(e: Explanation) -> Iterator[Block]:
 
 def _each_row(e: Explanation, row: ExplainedRow) -> Iterator[Block]:
     i = row.index
-    yield Sentence(f'`A_{i} = {_between(i, i + 1)} = {_factors(row, i)}`   {_joint(row.row)}')
-    yield Note(f'`theta_{i} = {_theta(e, row)}`   `d_{i} = {_d(e, row)}`   '
-               f'`a_{i} = {plain(row.a)}`   `alpha_{i} = {_in_pi(row.link.alpha)}`')
+    yield Sentence(
+        f'`A_{i} = {_between(i, i + 1)} = {_factors(row, i)}`   {_joint(row.row)}'
+    )
+    yield Note(
+        f'`theta_{i} = {_theta(e, row)}`   `d_{i} = {_d(e, row)}`   '
+        f'`a_{i} = {plain(row.a)}`   `alpha_{i} = {_in_pi(row.link.alpha)}`'
+    )
     yield Equation('', list(row.factors.values()))
     yield _transform('', row.A)
 
@@ -328,8 +403,10 @@ def _transform(name: str, T: Matrix) -> Equation | Entries:
 
 def _answer(e: Explanation, q: Sequence[float]) -> Iterator[Block]:
     x, y, z, _ = (short(float(row[3])) for row in e.T_root_tip.tolist())
-    yield Sentence(f'{e.chain.frame_id} is at x = {x}, y = {y}, z = {z} mm in '
-                   f'{e.chain.root_frame}.')
+    yield Sentence(
+        f'{e.chain.frame_id} is at x = {x}, y = {y}, z = {z} mm in '
+        f'{e.chain.root_frame}.'
+    )
     for note in text.range_notes(e.chain, q):
         yield Sentence(_free_text(note))
 

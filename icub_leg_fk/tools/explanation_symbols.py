@@ -39,9 +39,11 @@ def import_sympy(module: str = 'sympy') -> Any:
         return import_module(module)
     except ImportError as error:
         raise MissingDependencyError(
-            'sympy', 'an explanation in exact numbers or as a formula',
+            'sympy',
+            'an explanation in exact numbers or as a formula',
             'pip install sympy (rosdep key python3-sympy); decimals need no library, such as '
-            'with --degrees alone') from error
+            'with --degrees alone',
+        ) from error
 
 
 class Exact:
@@ -58,7 +60,7 @@ class Exact:
     def number(self, value: float) -> Cell:
         """Return a number: exact if it has few decimals, as printed ones do."""
         exact = Fraction(repr(round(value, _NOISE)))
-        if 10 ** _DECIMALS % exact.denominator == 0:
+        if 10**_DECIMALS % exact.denominator == 0:
             return self._sympy.Rational(exact)
         return self._sympy.Float(value)
 
@@ -77,7 +79,9 @@ class Exact:
         """Return cosine and sine: of a symbol, simple as 0 or sqrt(3)/2, or in decimals."""
         values = self._sympy.cos(angle), self._sympy.sin(angle)
         if angle.is_number:
-            return tuple(value if (value**2).is_Rational else value.n() for value in values)
+            return tuple(
+                value if (value**2).is_Rational else value.n() for value in values
+            )
         return values
 
     def matrix(self, rows: Sequence[Sequence[Cell]]) -> Matrix:
@@ -114,10 +118,16 @@ class Exact:
         terms = []
         for term in self._sympy.Add.make_args(entry):
             number, symbols = term.as_independent(self._sympy.Symbol, as_Add=False)
-            terms.append(number.n() * symbols if number.has(self._sympy.Float) else term)
+            terms.append(
+                number.n() * symbols if number.has(self._sympy.Float) else term
+            )
         total = self._sympy.Add(*terms)
-        return total.xreplace({value: self._sympy.Float(round(float(value), _NOISE))
-                               for value in total.atoms(self._sympy.Float)})
+        return total.xreplace(
+            {
+                value: self._sympy.Float(round(float(value), _NOISE))
+                for value in total.atoms(self._sympy.Float)
+            }
+        )
 
 
 def symbol(name: str) -> Cell:
@@ -182,7 +192,7 @@ def _as_shown(expression: Cell) -> Cell:
 def _short_number(number: Cell) -> Cell:
     """Return a number as a decimal, unless it is a simple fraction or root."""
     sympy = import_sympy()
-    is_decimal = number.is_Rational and 10 ** _DECIMALS % number.q == 0
+    is_decimal = number.is_Rational and 10**_DECIMALS % number.q == 0
     if is_decimal or number.has(sympy.Float) or len(str(number)) > _LONGEST:
         words = short(float(number), _DECIMALS if is_decimal else 4)
         return sympy.Float(words) if '.' in words else sympy.Integer(words)

@@ -82,7 +82,12 @@ def _entries(entries: Entries) -> list[str]:
     for name, cell in entries.by_name():
         left = f'    {name:4} = '
         words = re.sub(r' (?![+-] )', _NO_BREAK, plain(cell))
-        lines += textwrap.wrap(words, text.WIDTH, initial_indent=left,
-                               subsequent_indent=' ' * len(left), break_long_words=False,
-                               break_on_hyphens=False)
+        lines += textwrap.wrap(
+            words,
+            text.WIDTH,
+            initial_indent=left,
+            subsequent_indent=' ' * len(left),
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
     return [line.replace(_NO_BREAK, ' ') for line in lines]

@@ -17,7 +17,7 @@ def kinematics_file_text(chains: Sequence[Chain], comments: Sequence[str]) -> st
     """Return chains as a kinematics file.
 
     Args:
-        chains: the chains, each with a name of its own.
+        chains: the chains, with different names.
         comments: what stands at the top, a line each.
     """
     lines = [f'# {comment}' for comment in comments]
@@ -39,7 +39,8 @@ def _chain_lines(chain: Chain) -> list[str]:
         f'    tip: {chain.tip}',
         f'    root_frame: {_quoted(chain.root_frame)}',
         f'    joints: [{joints}]',
-        '    tip_frames:']
+        '    tip_frames:',
+    ]
     for name, tip_frame in chain.tip_frames.items():
         lines += _tip_frame_lines(name, tip_frame)
     lines += ['    versions:', f'      {_quoted(chain.version)}:']
@@ -55,33 +56,50 @@ def _chain_lines(chain: Chain) -> list[str]:
 
 def _tip_frame_lines(name: str, tip_frame: TipFrame) -> list[str]:
     name, frame_id = _quoted(name), _quoted(tip_frame.frame_id)
-    is_plain = np.array_equal(tip_frame.T_tip_frame, np.eye(4)) and tip_frame.outline is None
+    is_plain = (
+        np.array_equal(tip_frame.T_tip_frame, np.eye(4)) and tip_frame.outline is None
+    )
     if is_plain:
         return [f'      {name}: {{frame: {frame_id}}}']
-    lines = [f'      {name}:', f'        frame: {frame_id}', '        transform:',
-             *_matrix_lines(tip_frame.T_tip_frame, 10)]
+    lines = [
+        f'      {name}:',
+        f'        frame: {frame_id}',
+        '        transform:',
+        *_matrix_lines(tip_frame.T_tip_frame, 10),
+    ]
     if tip_frame.outline is not None:
-        corners = [f'[{short(1000 * x, 10)}, {short(1000 * y, 10)}]'
-                   for x, y in tip_frame.outline.tolist()]
+        corners = [
+            f'[{short(1000 * x, 10)}, {short(1000 * y, 10)}]'
+            for x, y in tip_frame.outline.tolist()
+        ]
         lines.append(f'        outline: [{", ".join(corners)}]')
     return lines
 
 
 def _row_lines(rows: Sequence[Row]) -> list[str]:
     """Return the rows, their cells under each other."""
-    cells = [(short(1000 * row.link.a, 10), short(1000 * row.link.d, 10),
-              short(math.degrees(row.link.alpha), 13), short(math.degrees(row.link.offset), 13),
-              _more(row)) for row in rows]
+    cells = [
+        (
+            short(1000 * row.link.a, 10),
+            short(1000 * row.link.d, 10),
+            short(math.degrees(row.link.alpha), 13),
+            short(math.degrees(row.link.offset), 13),
+            _more(row),
+        )
+        for row in rows
+    ]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     lines = []
     for a, d, alpha, offset, more in cells:
-        lines.append(f'          - {{a: {a:>{widths[0]}}, d: {d:>{widths[1]}}, '
-                     f'alpha: {alpha:>{widths[2]}}, offset: {offset:>{widths[3]}}{more}}}')
+        lines.append(
+            f'          - {{a: {a:>{widths[0]}}, d: {d:>{widths[1]}}, '
+            f'alpha: {alpha:>{widths[2]}}, offset: {offset:>{widths[3]}}{more}}}'
+        )
     return lines
 
 
 def _more(row: Row) -> str:
-    """Return what a row has beside its four numbers."""
+    """Return what a row has besides its four numbers."""
     link = row.link
     more = ''
     if row.is_first and link.has_limits:
@@ -100,7 +118,9 @@ def _more(row: Row) -> str:
 def _matrix_lines(T: Array, indent: int) -> list[str]:
     rows = []
     for row in T.tolist():
-        rows.append([*(short(value, 16) for value in row[:3]), short(1000 * row[3], 10)])
+        rows.append(
+            [*(short(value, 16) for value in row[:3]), short(1000 * row[3], 10)]
+        )
     rows[3][3] = '1'
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = []

@@ -1,13 +1,12 @@
 """What subcommands share: options by their names, and the chains and joint positions they mean."""
 
 import argparse
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Sequence
 import math
 import sys
 from typing import Any
 
-from icub_leg_fk.errors import JointVectorError, LegFKError, UnknownNameError
+from icub_leg_fk.errors import InputFileError, JointVectorError, LegFKError
 from icub_leg_fk.kinematics import Catalog, Chain, ChainEntry
 from icub_leg_fk.stream.configuration import LEGS
 
@@ -38,7 +37,8 @@ def add_joint_positions(parser: argparse.ArgumentParser, *, required: bool) -> N
             metavar='Q',
             nargs='+',
             type=_joint_position,
-            help=f'joint positions in {unit}, root to tip; of a prismatic joint always in metres')
+            help=f'joint positions in {unit}, root to tip; of a prismatic joint always in metres',
+        )
 
 
 def number(text: str) -> float:
@@ -51,47 +51,65 @@ def number(text: str) -> float:
         return math.nan
 
 
-def number_between(low: float, high: float, allowed: str = '') -> Callable[[str], float]:
+def number_between(
+    low: float, high: float, allowed: str = ''
+) -> Callable[[str], float]:
     """Return what reads an option that is a number from one to another, both included."""
+
     def parse(text: str) -> float:
         value = number(text)
         if not low <= value <= high:
             numbers = allowed or f'{low:g} to {high:g}'
             raise argparse.ArgumentTypeError(f'found {text!r}, allowed: {numbers}')
         return value
+
     return parse
 
 
 def load_catalog(args: argparse.Namespace) -> Catalog:
     """Return the catalog that `-k` names, with a line on stderr for each of its warnings."""
-    for option in ('kinematics_file', 'version', 'foot_frame'):
-        if getattr(args, option, None) == '':  # as an unset variable of the shell leaves it
+    for option in ('kinematics_file', 'root', 'version', 'foot_frame'):
+        if (
+            getattr(args, option, None) == ''
+        ):  # as an unset variable of the shell leaves it
             words = option.replace('_', '-')
             raise LegFKError(f'--{words} is empty; leave it out for its default')
-    catalog = Catalog.load(args.kinematics_file)
+    catalog = Catalog.load(args.kinematics_file, root=getattr(args, 'root', None))
     for line in catalog.warnings:
         print(f'leg_fk: warning: {line}', file=sys.stderr)
     return catalog
 
 
+def refuse_no_chains(catalog: Catalog) -> None:
+    """Refuse a URDF without chains."""
+    if not catalog.chains:
+        raise InputFileError(
+            catalog.file, 'has no chain: no joint moves a link at its ends'
+        )
+
+
 def load_chain(args: argparse.Namespace) -> tuple[Catalog, Chain]:
     """Return the catalog, and the chain that the options name."""
     catalog = load_catalog(args)
-    with advice_on_chains(catalog):
-        return catalog, catalog.chain(args.chain, args.version, args.foot_frame)
+    return catalog, catalog.chain(args.chain, args.version, args.foot_frame)
 
 
-def chosen_chains(args: argparse.Namespace) -> list[Chain]:
-    """Return the chains that the options name, or both legs, or else all that there are."""
+def chains_of_one_root(args: argparse.Namespace) -> list[Chain]:
+    """Return the chains asked for, or both legs, or else all of the file.
+
+    Raises:
+        LegFKError: they have several root frames.
+    """
     catalog = load_catalog(args)
     legs = [name for name in LEGS if name in catalog.chains]
-    with advice_on_chains(catalog):
-        chains = catalog.select(args.chains or legs or list(catalog.chains), args.version)
+    chains = catalog.select(args.chains or legs or catalog.chains, args.version)
     roots = sorted({chain.root_frame for chain in chains})
     if len(roots) > 1:
-        raise LegFKError(f'--chains: found the root frames {", ".join(roots)}, allowed: chains of '
-                         'one root frame')
-    if args.foot_frame is None:
+        raise LegFKError(
+            f'the chains have the root frames {", ".join(roots)}; allowed: chains of '
+            'one root frame'
+        )
+    if not args.foot_frame:
         return list(chains)
     return _in_frame(chains, args.foot_frame)
 
@@ -114,21 +132,9 @@ def _in_frame(chains: Sequence[Chain], frame: str) -> list[Chain]:
             framed.append(chain.with_frame(frame))
         else:
             framed.append(chain)
-            print(f'leg_fk: note: {chain.name} has no {frame} frame; its pose is that of '
-                  f'{chain.frame_id}', file=sys.stderr)
+            note = f'{chain.name} has no {frame} frame; its pose is that of {chain.frame_id}'
+            print_notes([], [note])
     return framed
-
-
-@contextmanager
-def advice_on_chains(catalog: Catalog) -> Iterator[None]:
-    """Where a tip or a frame is given for a chain, let the error say which chain has it."""
-    try:
-        yield
-    except UnknownNameError as error:
-        owner = _owner(catalog, error.name)
-        if error.kind != 'chain' or not owner:
-            raise
-        raise UnknownNameError(error.kind, error.name, error.choices, owner) from error
 
 
 def joint_positions(args: argparse.Namespace, chain: Chain) -> list[float] | None:
@@ -137,8 +143,11 @@ def joint_positions(args: argparse.Namespace, chain: Chain) -> list[float] | Non
     if not given:
         return None
     if len(given) != chain.n:
-        raise JointVectorError('the joint vector', f'has {len(given)} entries',
-                               f'{chain.n}, in the order {" ".join(chain.joint_names)}')
+        raise JointVectorError(
+            'the joint vector',
+            f'has {len(given)} entries',
+            f'{chain.n}, in the order {" ".join(chain.joint_names)}',
+        )
     if args.radians:
         _warn_of_degrees(chain, args.radians)
         return list(args.radians)
@@ -150,13 +159,16 @@ def joint_positions(args: argparse.Namespace, chain: Chain) -> list[float] | Non
 
 def _joint_position(text: str) -> float:
     if ',' in text:
-        raise argparse.ArgumentTypeError(f'found {text!r}; numbers are separated by spaces, and '
-                                         'their decimals by a point')
+        raise argparse.ArgumentTypeError(
+            f'found {text!r}; numbers are separated by spaces, and '
+            'their decimals by a point'
+        )
     return _position_in_bounds(text)
 
 
 _position_in_bounds = number_between(
-    -LARGEST, LARGEST, f'finite numbers up to {LARGEST:g}, one per joint')
+    -LARGEST, LARGEST, f'finite numbers up to {LARGEST:g}, one per joint'
+)
 
 
 def _warn_of_degrees(chain: Chain, q: list[float]) -> None:
@@ -168,23 +180,16 @@ def _warn_of_degrees(chain: Chain, q: list[float]) -> None:
         if name in outside and is_turns:
             doubtful.append(f'{name} {value:g}')
     if doubtful:
-        print(f'leg_fk: warning: positions look like degrees, for which there is --degrees: '
-              f'{", ".join(doubtful)}', file=sys.stderr)
+        print(
+            f'leg_fk: warning: positions look like degrees, for which there is --degrees: '
+            f'{", ".join(doubtful)}',
+            file=sys.stderr,
+        )
 
 
-def _owner(catalog: Catalog, name: str) -> str:
-    """Return whose tip or frame a name is; nothing if it is neither."""
-    for entry in catalog.chains.values():
-        if name == entry.tip:
-            return f'{name} is the tip of {entry.name}'
-        for chain in entry.versions.values():
-            for frame, tip_frame in chain.tip_frames.items():
-                if name == tip_frame.frame_id:
-                    return f'{name} is {entry.name} with --foot-frame {frame}'
-    return ''
-
-
-def _complete_chain(prefix: str, parsed_args: argparse.Namespace, **_: Any) -> list[str]:
+def _complete_chain(
+    prefix: str, parsed_args: argparse.Namespace, **_: Any
+) -> list[str]:
     """Return the chains, or after an equals sign the versions of one."""
     catalog = load_catalog(parsed_args)
     name = prefix.rpartition('=')[0]
@@ -195,7 +200,9 @@ def _complete_chain(prefix: str, parsed_args: argparse.Namespace, **_: Any) -> l
 
 def _complete_version(parsed_args: argparse.Namespace, **_: Any) -> list[str]:
     """Return the versions of the chains typed so far, or of all."""
-    return [version for entry in _typed_chains(parsed_args) for version in entry.versions]
+    return [
+        version for entry in _typed_chains(parsed_args) for version in entry.versions
+    ]
 
 
 def _complete_frame(parsed_args: argparse.Namespace, **_: Any) -> list[str]:
@@ -226,43 +233,52 @@ _COMPLETERS: dict[str, Callable[..., list[str]]] = {
 _OPTIONS: dict[str, dict[str, Any]] = {
     'chain': {
         'metavar': 'CHAIN',
-        'help': 'a chain, such as left_leg or left_leg=v1 (leg_fk list shows them)'},
+        'help': 'a chain, such as left_leg or left_leg=v1 (leg_fk list shows them)',
+    },
     'chains': {
         'metavar': 'CHAIN',
         'nargs': '*',
         'help': 'chains, such as left_leg or head_imu=v2 (default: all that have the version '
-                'asked for, or if none is, that of the first chain)'},
+        'asked for, or if none is, that of the first chain)',
+    },
     '--chains': {
         'metavar': 'CHAIN',
         'nargs': '+',
-        'help': 'chains, such as left_leg or head_imu=v2 (default: both legs)'},
+        'help': 'chains, such as left_leg or head_imu=v2 (default: both legs)',
+    },
     '--version': {
         'metavar': 'VERSION',
-        'help': "of the chains named without one (default: the file's)"},
+        'help': "of the chains named without one (default: the file's)",
+    },
     '--foot-frame': {
         'metavar': 'FRAME',
         'help': "axes of the tip: of the iCub's feet dh, the table's last frame (the default), "
-                'or sole, x forward, y left, z up'},
+        'or sole, x forward, y left, z up',
+    },
     '--joint-topic': {
         'metavar': 'TOPIC',
         'nargs': '+',
         'dest': 'joint_topics',
         'default': (),
         'help': "the bag's topics of joint states (default: /joint_states, or the only one there "
-                'is)'},
+        'is)',
+    },
     '--time-unit': {
         'metavar': '{s,ms,us,ns}',
         'choices': ('s', 'ms', 'us', 'ns'),
         'default': '',
-        'help': 'unit of the times in a CSV file (default: told by their size and the header)'},
-    '--json': {
-        'action': 'store_true',
-        'help': 'print JSON, for programs'},
+        'help': 'unit of the times in a CSV file (default: told by their size and the header)',
+    },
+    '--json': {'action': 'store_true', 'help': 'print JSON, for programs'},
     '--kinematics-file': {
         'metavar': 'FILE',
-        'help': "a kinematics file, with the DH tables of any robot (default: the iCub's, as "
-                'shipped)'},
-    '--force': {
-        'action': 'store_true',
-        'help': 'replace what exists already'},
+        'help': 'a kinematics file, with the DH tables of any robot, or a URDF (default: the '
+        'tables of the iCub, as shipped)',
+    },
+    '--root': {
+        'metavar': 'LINK',
+        'help': 'of a URDF, the link that poses are given in (default: root_link, or the top of '
+        'the tree)',
+    },
+    '--force': {'action': 'store_true', 'help': 'replace what exists already'},
 }

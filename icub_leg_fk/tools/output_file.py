@@ -16,11 +16,12 @@ _PART_OF_BAG = re.compile(r'.*\.(mcap|db3)(\.zstd)?(-wal|-shm)?')
 
 
 @contextmanager
-def whole_path(path: str | Path, *, force: bool,
-               may_replace: Callable[[Path], bool] = Path.is_file) -> Iterator[Path]:
+def whole_path(
+    path: str | Path, *, force: bool, may_replace: Callable[[Path], bool] = Path.is_file
+) -> Iterator[Path]:
     """Give a path to make a file or directory at; it takes its place when the block ends well.
 
-    The work is done in a hidden directory beside the target, of which nothing is left. A target
+    The work is done in a hidden directory next to the target, which is removed. A target
     that exists is replaced if that is forced, and `may_replace` says that it is of the kind.
 
     Raises:
@@ -29,8 +30,12 @@ def whole_path(path: str | Path, *, force: bool,
     check_target(path, force=force, may_replace=may_replace)
     target = Path(os.path.realpath(path))
     try:
-        with tempfile.TemporaryDirectory(prefix=f'.{target.name}.', suffix='.part',
-                                         dir=target.parent, ignore_cleanup_errors=True) as work:
+        with tempfile.TemporaryDirectory(
+            prefix=f'.{target.name}.',
+            suffix='.part',
+            dir=target.parent,
+            ignore_cleanup_errors=True,
+        ) as work:
             new = Path(work, target.name)
             yield new
             check_target(path, force=force, may_replace=may_replace)
@@ -39,11 +44,12 @@ def whole_path(path: str | Path, *, force: bool,
                     target.rename(Path(work, 'replaced'))
                 new.replace(target)
     except OSError as error:
-        raise OutputFileError(str(path), error.strerror or str(error)) from error
+        raise _cannot_be_written(path, error) from error
 
 
-def check_target(path: str | Path, *, force: bool,
-                 may_replace: Callable[[Path], bool] = Path.is_file) -> None:
+def check_target(
+    path: str | Path, *, force: bool, may_replace: Callable[[Path], bool] = Path.is_file
+) -> None:
     """Refuse a target that `whole_path` would refuse, before any work is done.
 
     Raises:
@@ -53,28 +59,48 @@ def check_target(path: str | Path, *, force: bool,
     target = Path(os.path.realpath(path))
     if not target.parent.is_dir():
         raise OutputFileError(str(path), f'there is no directory {target.parent}')
-    if not os.path.lexists(target):
-        return
-    if not may_replace(target):
-        raise OutputFileError(str(path), 'exists already and is something else than what would be '
-                                         'written; nothing replaces it')
-    if not force:
-        raise OutputFileError(str(path), 'exists already; --force replaces it')
+    if os.path.lexists(target):
+        if not may_replace(target):
+            raise OutputFileError(
+                str(path),
+                'exists already and is something else than what '
+                'would be written; nothing replaces it',
+            )
+        if not force:
+            raise OutputFileError(str(path), 'exists already; --force replaces it')
+    try:
+        tempfile.TemporaryDirectory(
+            prefix=f'.{target.name}.', dir=target.parent
+        ).cleanup()
+    except OSError as error:
+        raise _cannot_be_written(path, error) from error
+
+
+def _cannot_be_written(path: str | Path, error: OSError) -> OutputFileError:
+    reason = error.strerror or str(error)
+    return OutputFileError(str(path), f'cannot be written: {reason.lower()}')
 
 
 def refuse_option_like(path: str | Path) -> None:
-    """Refuse the name of an output that begins as an option does.
+    """Refuse an output without a name, or with one that begins as an option does.
 
     Raises:
-        OutputFileError: says how such a file can be named all the same.
+        OutputFileError: says why, and how such a file can be named all the same.
     """
     name = str(path).strip()
+    if not name or not Path(path).name:
+        raise OutputFileError(repr(str(path)), 'is not the name of a file')
     if name == STANDARD_OUTPUT:
-        raise OutputFileError(name, 'is standard output, which does not take this; allowed: the '
-                                    'name of a file')
+        raise OutputFileError(
+            name,
+            'is standard output, which does not take this; allowed: the name of a file',
+        )
     if name.startswith('-'):
-        raise OutputFileError(name, f'begins with a minus sign, as options do; a file of this '
-                                    f'name is written ./{name}')
+        raise OutputFileError(
+            name,
+            f'begins with a minus sign, as options do; a file of this '
+            f'name is written ./{name}',
+        )
 
 
 def write_text(path: str | None, text: str, *, force: bool) -> None:

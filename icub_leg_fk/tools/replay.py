@@ -1,4 +1,4 @@
-"""The demonstration's session: the node in a process of its own, joint states out, poses back."""
+"""The demonstration's session: the node in its own process, joint states out, poses back."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -12,9 +12,10 @@ import tempfile
 import time
 from typing import Any, IO
 
-from icub_leg_fk.errors import LegFKError, MissingDependencyError
+from icub_leg_fk.errors import LegFKError
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.tools.recording import JointRecording
+from icub_leg_fk.tools.ros import import_ros
 from icub_leg_fk.tools.signals import held_signals
 import numpy as np
 
@@ -59,13 +60,18 @@ def stay_on_this_machine() -> str:
     """Let DDS reach nobody else; return the ROS_DOMAIN_ID, the user's if there is one."""
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     os.environ.pop('ROS_STATIC_PEERS', None)
-    return os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % _HIGHEST_DOMAIN))
+    return os.environ.setdefault(
+        'ROS_DOMAIN_ID', str(1 + os.getpid() % _HIGHEST_DOMAIN)
+    )
 
 
 def lossless(namespace: str, tips: Iterable[str], depth: int) -> dict[str, str]:
     """Return parameters by which the node loses nothing when a process is held up."""
     subscription = f'qos_overrides.{namespace}/joint_states.subscription'
-    parameters = {f'{subscription}.reliability': 'reliable', f'{subscription}.depth': str(depth)}
+    parameters = {
+        f'{subscription}.reliability': 'reliable',
+        f'{subscription}.depth': str(depth),
+    }
     for tip in tips:
         pose = f'{namespace}/foot_pose_publisher/{tip}/pose'
         parameters[f'qos_overrides.{pose}.publisher.depth'] = str(depth)
@@ -73,12 +79,15 @@ def lossless(namespace: str, tips: Iterable[str], depth: int) -> dict[str, str]:
 
 
 @contextmanager
-def running_node(namespace: str, parameters: Mapping[str, str],
-                 program: Sequence[str] = ('icub_leg_fk.node.main',), own_session: bool = True
-                 ) -> Iterator[tuple[subprocess.Popen[bytes], Callable[[], None]]]:
-    """Run `foot_pose_publisher`, or another module, in a process of its own.
+def running_node(
+    namespace: str,
+    parameters: Mapping[str, str],
+    program: Sequence[str] = ('icub_leg_fk.node.main',),
+    own_session: bool = True,
+) -> Iterator[tuple[subprocess.Popen[bytes], Callable[[], None]]]:
+    """Run `foot_pose_publisher`, or another module, in its own process.
 
-    In a session of its own Ctrl-C does not reach it. Gives the process, and what raises
+    In its own session Ctrl-C does not reach it. Gives the process, and what raises
     `DemoError` once it has stopped by itself.
     """
     command = [sys.executable, '-m', *program, '--ros-args', '-r', f'__ns:={namespace}']
@@ -87,9 +96,16 @@ def running_node(namespace: str, parameters: Mapping[str, str],
     process: subprocess.Popen[bytes] | None = None
     with tempfile.TemporaryFile() as log:
         try:
-            with held_signals():  # the node must not get away between its start and the next line
-                process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log,
-                                           stderr=log, start_new_session=own_session)
+            with (
+                held_signals()
+            ):  # the node must not get away between its start and the next line
+                process = subprocess.Popen(
+                    command,
+                    stdin=subprocess.DEVNULL,
+                    stdout=log,
+                    stderr=log,
+                    start_new_session=own_session,
+                )
             yield process, partial(_check_runs, process, log)
         finally:
             with held_signals():
@@ -104,8 +120,10 @@ def _check_runs(process: subprocess.Popen[bytes], log: IO[bytes]) -> None:
     log.seek(0)
     lines = log.read().decode(errors='replace').split('\n')
     last_words = [line.strip() for line in lines if line.strip()][-1:]
-    raise DemoError(f'the node stopped with exit status {status}: '
-                    f'{"".join(last_words) or "it said nothing"}')
+    raise DemoError(
+        f'the node stopped with exit status {status}: '
+        f'{"".join(last_words) or "it said nothing"}'
+    )
 
 
 def _stop(process: subprocess.Popen[bytes]) -> None:
@@ -125,29 +143,50 @@ class Replay:
         sent: stamp [ns] and bytes of each message sent.
     """
 
-    def __init__(self, recording: JointRecording, namespace: str, tips: Sequence[str]) -> None:
-        rclpy, joint_state, pose_stamped = _import_rclpy()
+    def __init__(
+        self, recording: JointRecording, namespace: str, tips: Sequence[str]
+    ) -> None:
+        rclpy, joint_state, pose_stamped = import_ros('the demonstration')
         count = len(recording.times)
-        self.answers = [Answers(tip, np.full((count, 7), np.nan), np.full(count, np.nan))
-                        for tip in tips]
+        self.answers = [
+            Answers(tip, np.full((count, 7), np.nan), np.full(count, np.nan))
+            for tip in tips
+        ]
         self.sent: list[tuple[int, bytes]] = []
         self._recording = recording
-        self._awaited: dict[int, tuple[int, float]] = {}  # by stamp: which message, sent when
+        self._awaited: dict[
+            int, tuple[int, float]
+        ] = {}  # by stamp: which message, sent when
         self._found: set[str] = set()
         self._joint_state = joint_state
         self._serialize = rclpy.serialization.serialize_message
         self._context = rclpy.context.Context()
         try:
-            rclpy.init(args=[], context=self._context,
-                       signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
+            rclpy.init(
+                args=[],
+                context=self._context,
+                signal_handler_options=rclpy.signals.SignalHandlerOptions.NO,
+            )
             self._node = rclpy.create_node(
-                'leg_fk_demo', namespace=namespace, context=self._context,
-                use_global_arguments=False, enable_rosout=False, start_parameter_services=False)
-        except (RuntimeError, ValueError) as error:  # what rclpy raises for what rcl refuses
-            raise DemoError(f'ROS 2 cannot be started: {" ".join(str(error).split())}') from error
+                'leg_fk_demo',
+                namespace=namespace,
+                context=self._context,
+                use_global_arguments=False,
+                enable_rosout=False,
+                start_parameter_services=False,
+            )
+        except (
+            RuntimeError,
+            ValueError,
+        ) as error:  # what rclpy raises for what rcl refuses
+            raise DemoError(
+                f'ROS 2 cannot be started: {" ".join(str(error).split())}'
+            ) from error
         self._executor = rclpy.executors.SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
-        self._publisher = self._node.create_publisher(joint_state, 'joint_states', DEPTH)
+        self._publisher = self._node.create_publisher(
+            joint_state, 'joint_states', DEPTH
+        )
         for answers in self.answers:
             topic = f'foot_pose_publisher/{answers.tip}/pose'
             take = partial(self._take, answers)
@@ -162,23 +201,26 @@ class Replay:
     def wait_for_node(self, check: Callable[[], None]) -> None:
         """Send messages, which do not count, until each tip has answered one.
 
-        `check` is called again and again, and raises if there is no hope.
+        `check` is called again and again, and raises if the node has ended.
         """
         deadline = time.monotonic() + _DISCOVERY_TIMEOUT
         while len(self._found) < len(self.answers):
             check()
             now = time.monotonic()
             if now > deadline:
-                raise DemoError(f'the node was not found over DDS in {_DISCOVERY_TIMEOUT:g} s')
+                raise DemoError(
+                    f'the node was not found over DDS in {_DISCOVERY_TIMEOUT:g} s'
+                )
             self._publish(time.time_ns(), _PROBE)
             self._spin_until(now + _PROBE_PERIOD)
 
-    def play(self, on_time: Callable[[float], None], period: float, check: Callable[[], None]
-             ) -> None:
+    def play(
+        self, on_time: Callable[[float], None], period: float, check: Callable[[], None]
+    ) -> None:
         """Publish every message at its time and wait for the poses.
 
         Every `period` seconds, `on_time` is called with the time since the first message [s], and
-        `check`, which raises if there is no hope.
+        `check`, which raises if the node has ended.
         """
         offsets = (self._recording.times - self._recording.times[0]).tolist()
         start, start_ns = time.monotonic(), time.time_ns()
@@ -241,26 +283,14 @@ class Replay:
 
     def _publish(self, stamp: int, index: int) -> bytes:
         row = self._recording.positions[max(index, 0)]
-        message = self._joint_state(name=list(self._recording.joint_names), position=row.tolist())
-        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
+        message = self._joint_state(
+            name=list(self._recording.joint_names), position=row.tolist()
+        )
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(
+            stamp, 1_000_000_000
+        )
         data = bytes(self._serialize(message))
         self._awaited[stamp] = index, time.monotonic()
         with held_signals():
             self._publisher.publish(data)
         return data
-
-
-def _import_rclpy() -> tuple[Any, Any, Any]:
-    """Return rclpy, JointState and PoseStamped."""
-    try:
-        from geometry_msgs.msg import PoseStamped
-        import rclpy.context
-        import rclpy.executors
-        import rclpy.serialization
-        import rclpy.signals
-        from sensor_msgs.msg import JointState
-    except ImportError as error:
-        raise MissingDependencyError(
-            'rclpy', 'the demonstration',
-            'source ROS 2, or pip install "icub_leg_fk[ros]"') from error
-    return rclpy, JointState, PoseStamped

@@ -17,7 +17,9 @@ def stop_on_signals() -> Iterator[None]:
 
     One that is ignored, as `nohup` wants it, stays so.
     """
-    numbers = [number for number in _STOPPING if signal.getsignal(number) != signal.SIG_IGN]
+    numbers = [
+        number for number in _STOPPING if signal.getsignal(number) != signal.SIG_IGN
+    ]
     with _handled(numbers, lambda number, frame: sys.exit(128 + number)):
         yield
 
@@ -27,7 +29,9 @@ def held_signals() -> Iterator[None]:
     """While it lasts, the signals that end the process wait."""
     arrived: list[int] = []
     try:
-        with _handled([signal.SIGINT, *_STOPPING], lambda number, frame: arrived.append(number)):
+        with _handled(
+            [signal.SIGINT, *_STOPPING], lambda number, frame: arrived.append(number)
+        ):
             yield
     finally:
         if arrived:
@@ -36,7 +40,9 @@ def held_signals() -> Iterator[None]:
 
 @contextmanager
 def _handled(numbers: Iterable[int], handler: Callable[..., None]) -> Iterator[None]:
-    if threading.current_thread() is not threading.main_thread():  # signals are that one's alone
+    if (
+        threading.current_thread() is not threading.main_thread()
+    ):  # signals are that one's alone
         numbers = ()
     before = {number: signal.signal(number, handler) for number in numbers}
     try:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, TYPE_CHECKING
 
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
+from icub_leg_fk.stream.colors import color_of
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -19,9 +20,6 @@ FAINT = '#6f6f6f'
 GRID = '#dddddd'
 FLOOR = '#f7f7f7'
 
-_LEFT = '#6a3d9a'
-_RIGHT = '#e08214'  # told apart from the left in every kind of colour vision
-_OTHERS = ('#00798c', '#8c6d31', '#a8437c')
 _ROOT_AXES = 1.2  # sides of a square
 _MARGIN = 0.25  # inches around what is seen, for the names of axes
 _REACHES = (1.2, 1.45, 1.7, 2.0)  # lengths of an axis at which its name may stand
@@ -186,14 +184,6 @@ class Space:
                 self.axes.text(*at, name, fontsize=size, color=color, weight='bold', ha=place,
                                va='center', zorder=zorder + 1)
                 return
-
-
-def color_of(chain: Chain) -> str:
-    """Return a chain's colour: one for everything left, one for everything right."""
-    for word, color in (('left', _LEFT), ('right', _RIGHT)):
-        if word in chain.tip or word in chain.name:
-            return color
-    return _OTHERS[sum(map(ord, chain.name)) % len(_OTHERS)]
 
 
 def _grid(lowest: Array, highest: Array, step: float) -> list[Array]:

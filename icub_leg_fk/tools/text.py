@@ -16,7 +16,7 @@ _INNERMOST_LIST = re.compile(r'\[\n\s*([^][{}]*?)\n\s*\]')
 
 
 def fixed(value: float, decimals: int) -> str:
-    """Return a number with exactly so many decimals, and without a negative zero."""
+    """Return a number with a fixed number of decimals, without a negative zero."""
     return f'{round(value, decimals) + 0.0:.{decimals}f}'
 
 
@@ -32,18 +32,25 @@ def range_notes(chain: Chain, q: Sequence[float]) -> list[str]:
     for name, link, value in zip(chain.joint_names, chain.joints, q, strict=True):
         found = f'note: {name} = {position(link, value)}'
         if link.is_prismatic and abs(value) >= _UNLIKELY:
-            notes.append(f'{found}: positions of prismatic joints are in metres, not in mm')
+            notes.append(
+                f'{found}: positions of prismatic joints are in metres, not in mm'
+            )
         if name in outside:
             erratum = ''
-            if link.erratum and link.robot_range is None:  # the printed range is what counts
+            if (
+                link.erratum and link.robot_range is None
+            ):  # the printed range is what counts
                 erratum = f' (known erratum of the table: {link.erratum})'
-            notes.append(f'{found} is outside its range {joint_range(link)}{erratum}; computed as '
-                         'given, never clamped')
+            notes.append(
+                f'{found} is outside its range {joint_range(link)}{erratum}; computed as '
+                'given, never clamped'
+            )
     return notes
 
 
-def columns(rows: Sequence[Sequence[str]], gap: str = '  ', header: Sequence[str] = ()
-            ) -> list[str]:
+def columns(
+    rows: Sequence[Sequence[str]], gap: str = '  ', header: Sequence[str] = ()
+) -> list[str]:
     """Return the rows as lines; numbers stand with their points under each other."""
     aligned = [_aligned(column) for column in zip(*rows, strict=True)]
     if header:
@@ -64,8 +71,13 @@ def indented(lines: Iterable[str]) -> list[str]:
 
 def wrapped(text: str) -> list[str]:
     """Return the lines of a sentence, all but the first moved to the right."""
-    return textwrap.wrap(text, WIDTH, subsequent_indent='  ', break_long_words=False,
-                         break_on_hyphens=False)
+    return textwrap.wrap(
+        text,
+        WIDTH,
+        subsequent_indent='  ',
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
 
 
 def as_json(value: Any) -> str:
@@ -85,9 +97,13 @@ def _aligned(column: Sequence[str]) -> list[str]:
     """Return the cells of a column in one width: numbers by their points, words to the left."""
     if not _are_numbers(column):
         return _padded(column)
-    decimals = [len(cell) - len(cell.partition('.')[0]) for cell in column]  # and the point
+    decimals = [
+        len(cell) - len(cell.partition('.')[0]) for cell in column
+    ]  # and the point
     most = max(decimals)
-    filled = [cell + ' ' * (most - own) for cell, own in zip(column, decimals, strict=True)]
+    filled = [
+        cell + ' ' * (most - own) for cell, own in zip(column, decimals, strict=True)
+    ]
     width = max(map(len, filled))
     return [cell.rjust(width) for cell in filled]
 

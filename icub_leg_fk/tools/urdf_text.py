@@ -2,7 +2,7 @@
 
 The URDF link after joint i is frame i turned (or slid) by the joint alone, so the rest of the DH
 link, A_i at q = 0, becomes the fixed origin of the next joint. Every joint moves along its z. A
-row that follows the joint of another row is a joint of its own, which mimics that one.
+row that follows the joint of another row is another joint, which mimics that one.
 """
 
 from collections import Counter
@@ -14,11 +14,15 @@ from xml.etree import ElementTree as ET
 
 from icub_leg_fk.errors import LegFKError
 from icub_leg_fk.kinematics import Chain, DHLink, Row
-from icub_leg_fk.kinematics.rotation import Array
+from icub_leg_fk.kinematics.rotation import Array, roll_pitch_yaw
 import numpy as np
 
 _PLACEHOLDER = '50000'  # effort and velocity, which URDF demands and no table gives
-_COLOURS = {'bone': '0.82 0.82 0.85 1', 'joint': '0.25 0.27 0.32 1', 'tip': '0.90 0.45 0.10 1'}
+_COLOURS = {
+    'bone': '0.82 0.82 0.85 1',
+    'joint': '0.25 0.27 0.32 1',
+    'tip': '0.90 0.45 0.10 1',
+}
 _BONE_RADIUS = 0.012  # m
 _JOINT_RADIUS = 0.022  # m
 _TIP_RADIUS = 0.015  # m
@@ -49,31 +53,20 @@ def urdf_text(robot: str, chains: Sequence[Chain]) -> str:
     return model.text()
 
 
-def xyz_rpy(T: Array) -> tuple[Array, Array]:
-    """Return a transform as URDF has it: translation [m], and roll, pitch, yaw [rad].
-
-    R = Rz(yaw) Ry(pitch) Rx(roll). The yaw is taken out before the other two angles are read off,
-    so they are as accurate at pitch = pi/2, where any yaw would do, as elsewhere.
-    """
-    R = T[:3, :3]
-    is_locked = math.hypot(R[0, 0], R[1, 0]) < 1e-15
-    yaw = 0.0 if is_locked else math.atan2(R[1, 0], R[0, 0])
-    c, s = math.cos(yaw), math.sin(yaw)
-    pitch = math.atan2(-R[2, 0], c * R[0, 0] + s * R[1, 0])
-    roll = math.atan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
-    return T[:3, 3], np.array([roll, pitch, yaw])
-
-
 class _Model:
     """The robot element, as it grows chain by chain."""
 
     def __init__(self, robot: str, chains: Sequence[Chain]) -> None:
         tables = ', '.join(f'{chain.name} {chain.version}' for chain in chains)
         self._robot = ET.Element('robot', name=robot)
-        _comment(self._robot, 'Written by `leg_fk urdf` from the Denavit-Hartenberg tables of '
-                 f'{tables}.')
-        _comment(self._robot, 'Links have no inertia; effort and velocity limits are '
-                 'placeholders.')
+        _comment(
+            self._robot,
+            f'Written by `leg_fk urdf` from the Denavit-Hartenberg tables of {tables}.',
+        )
+        _comment(
+            self._robot,
+            'Links have no inertia; effort and velocity limits are placeholders.',
+        )
         for name, rgba in _COLOURS.items():
             material = ET.SubElement(self._robot, 'material', name=name)
             ET.SubElement(material, 'color', rgba=rgba)
@@ -103,10 +96,14 @@ class _Model:
         names = Counter((element.tag, element.get('name')) for element in self._robot)
         for (kind, name), count in names.items():
             if kind in ('link', 'joint') and count > 1:
-                raise LegFKError(f'{kind} {name} is there {count} times; allowed: once, since a '
-                                 'URDF has each name once')
+                raise LegFKError(
+                    f'{kind} {name} is there {count} times; allowed: once, since a '
+                    'URDF has each name once'
+                )
         ET.indent(self._robot)
-        return f'<?xml version="1.0"?>\n{ET.tostring(self._robot, encoding="unicode")}\n'
+        return (
+            f'<?xml version="1.0"?>\n{ET.tostring(self._robot, encoding="unicode")}\n'
+        )
 
     def _shared_with(self, chain: Chain, name: str, joint: _Joint) -> Array:
         """Return where the joint that is there has this one; refuse one that is elsewhere.
@@ -119,8 +116,10 @@ class _Model:
         aside = np.zeros(2) if joint.link.is_prismatic else T[:2, 3]
         is_same = max(np.abs(off_axis).max(), np.abs(aside).max()) <= _SAME_AXIS
         if not is_same or _motion(joint) != _motion(there):
-            raise LegFKError(f'joint {name!r} of chain {chain.name} is elsewhere in another '
-                             'chain; allowed: chains that agree on the joints they share')
+            raise LegFKError(
+                f'joint {name!r} of chain {chain.name} is elsewhere in another '
+                'chain; allowed: chains that agree on the joints they share'
+            )
         return T
 
     def _add_joint(self, chain: Chain, name: str, joint: _Joint) -> None:
@@ -130,8 +129,10 @@ class _Model:
         lower, upper = _limits(joint, driver)
         is_limited = math.isfinite(lower) and math.isfinite(upper)
         if joint.link.is_prismatic and not is_limited:
-            raise LegFKError(f'joint {name} of chain {chain.name} has no range; allowed: one with '
-                             'a range, since a URDF must limit a prismatic joint')
+            raise LegFKError(
+                f'joint {name} of chain {chain.name} has no range; allowed: one with '
+                'a range, since a URDF must limit a prismatic joint'
+            )
         joint_type = joint.link.joint_type if is_limited else 'continuous'
         element = ET.SubElement(self._robot, 'joint', name=name, type=joint_type)
         _place(element, joint.origin, joint.parent, _link_name(name))
@@ -143,7 +144,9 @@ class _Model:
             multiplier = repr(joint.link.gain)
             ET.SubElement(element, 'mimic', joint=joint.mimicked, multiplier=multiplier)
         if is_limited:
-            limit = ET.SubElement(element, 'limit', lower=repr(lower), upper=repr(upper))
+            limit = ET.SubElement(
+                element, 'limit', lower=repr(lower), upper=repr(upper)
+            )
             limit.set('effort', _PLACEHOLDER)
             limit.set('velocity', _PLACEHOLDER)
         body = ET.SubElement(self._robot, 'link', name=_link_name(name))
@@ -167,8 +170,10 @@ class _Model:
 def _common_root(chains: Sequence[Chain]) -> str:
     roots = sorted({chain.root_frame for chain in chains})
     if len(roots) > 1:
-        raise LegFKError(f'the chains have the roots {", ".join(roots)}; allowed: chains with the '
-                         'same root_frame, since a URDF has one root')
+        raise LegFKError(
+            f'the chains have the roots {", ".join(roots)}; allowed: chains with the '
+            'same root_frame, since a URDF has one root'
+        )
     return roots[0]
 
 
@@ -195,9 +200,11 @@ def _motion(joint: _Joint) -> tuple[str, str, float, str]:
 def _check_gain(chain: Chain, name: str, joint: _Joint) -> None:
     """Refuse a joint whose row moves further than the joint does."""
     if not joint.mimicked and abs(joint.link.gain) != 1.0:
-        raise LegFKError(f'joint {name} of chain {chain.name} moves its first row by '
-                         f'{joint.link.gain:g} times its position; allowed: 1 or -1 times, since '
-                         'a URDF has no gain')
+        raise LegFKError(
+            f'joint {name} of chain {chain.name} moves its first row by '
+            f'{joint.link.gain:g} times its position; allowed: 1 or -1 times, since '
+            'a URDF has no gain'
+        )
 
 
 def _limits(joint: _Joint, driver: DHLink) -> tuple[float, float]:
@@ -210,7 +217,7 @@ def _limits(joint: _Joint, driver: DHLink) -> tuple[float, float]:
 
 
 def _place(joint: ET.Element, origin: Array, parent: str, child: str) -> None:
-    _add_origin(joint, *xyz_rpy(origin))
+    _add_origin(joint, origin[:3, 3], roll_pitch_yaw(origin[:3, :3]))
     ET.SubElement(joint, 'parent', link=parent)
     ET.SubElement(joint, 'child', link=child)
 
@@ -223,8 +230,14 @@ def _words(vector: Array) -> str:
     return ' '.join(map(repr, (vector + 0.0).tolist()))  # no negative zeros
 
 
-def _draw(link: ET.Element, colour: str, shape: str, xyz: Array = _NOWHERE, rpy: Array = _NOWHERE,
-          **size: float | str) -> None:
+def _draw(
+    link: ET.Element,
+    colour: str,
+    shape: str,
+    xyz: Array = _NOWHERE,
+    rpy: Array = _NOWHERE,
+    **size: float | str,
+) -> None:
     visual = ET.SubElement(link, 'visual')
     _add_origin(visual, xyz, rpy)
     geometry = ET.SubElement(visual, 'geometry')
@@ -239,7 +252,9 @@ def _draw_bone(link: ET.Element, T: Array) -> None:
     length = math.hypot(x, y, z)
     if length >= _JOINT_RADIUS:
         rpy = np.array([0.0, math.atan2(math.hypot(x, y), z), math.atan2(y, x)])
-        _draw(link, 'bone', 'cylinder', end / 2, rpy, radius=_BONE_RADIUS, length=length)
+        _draw(
+            link, 'bone', 'cylinder', end / 2, rpy, radius=_BONE_RADIUS, length=length
+        )
 
 
 def _draw_sole(tip: ET.Element, outline: Array) -> None:

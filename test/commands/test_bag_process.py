@@ -184,11 +184,11 @@ def test_the_input_is_never_the_output(tmp_path, source):
         ),
         (
             ['in', 'out', '--chains', 'left_leg=v9'],
-            "unknown version of chain left_leg 'v9'",
+            "unknown version 'v9' of chain left_leg",
         ),
         (
             ['in', 'out', '--version', 'v9'],
-            "--version: unknown version of chain left_leg 'v9'",
+            "--version: unknown version 'v9' of chain left_leg",
         ),
         (
             ['in', 'out', '--joint-timeout', '1e300'],

@@ -35,7 +35,9 @@ JOINTS = [name for chain in CHAINS for name in chain.joint_names]
 @pytest.fixture(autouse=True)
 def own_directory(tmp_path, monkeypatch):
     path = [str(Path(__file__).parents[2]), os.environ.get('PYTHONPATH', '')]
-    monkeypatch.setenv('PYTHONPATH', os.pathsep.join(filter(None, path)))  # for the processes
+    monkeypatch.setenv(
+        'PYTHONPATH', os.pathsep.join(filter(None, path))
+    )  # for the processes
     monkeypatch.chdir(tmp_path)
 
 
@@ -44,8 +46,9 @@ def walk(seconds):
 
 
 def start(*words):
-    return subprocess.Popen([*DEMO, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                            text=True)
+    return subprocess.Popen(
+        [*DEMO, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
 
 
 def children(pid):
@@ -59,7 +62,9 @@ def children(pid):
 
 def runs(pid):
     try:
-        return Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0] != 'Z'
+        return (
+            Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()[0] != 'Z'
+        )
     except OSError:
         return False
 
@@ -88,20 +93,26 @@ def write_csv(path, times, positions):
 
 
 def test_every_pose_of_the_gait_arrives_and_is_drawn_and_kept():
-    done = run_main('demo', '--seconds', '2.5', '--save', 'walk')
+    done = run_main('demo', '--seconds', '1.5', '--save', 'walk')
     assert (done.returncode, done.stderr) == (0, '')
-    assert re.match(r'iCub legs v2_5: 251 JointState messages', done.stdout)
-    assert re.search(r'messages in +251\b', done.stdout)
-    assert re.search(r'poses out +502 +\(left_foot 251, right_foot 251\)', done.stdout)
-    assert re.search(r'lost +none', done.stdout)
-    assert re.search(r'latency +median [\d.]+ ms +p99 [\d.]+ ms +max [\d.]+ ms', done.stdout)
+    for said in (
+        r'^iCub legs v2_5: 151 JointState messages',
+        r'messages in +151\b',
+        r'poses out +302 +\(left_foot 151, right_foot 151\)',
+        r'lost +none',
+        r'latency +median [\d.]+ ms +p99 [\d.]+ ms +max [\d.]+ ms',
+    ):
+        assert re.search(said, done.stdout)
     assert Path('demo.png').read_bytes().startswith(b'\x89PNG')
     assert sorted(path.name for path in Path().iterdir()) == ['demo.png', 'walk']
     # Without a terminal there is a plain line a second, and one of the last state.
     assert '\x1b' not in done.stdout
-    lines = re.findall(r'^ +([\d.]+) s   in root_link: left foot: .*   right foot: x \S+',
-                       done.stdout, re.MULTILINE)
-    assert lines[-1] == '2.50' and 2 <= len(lines) <= 4
+    lines = re.findall(
+        r'^ +([\d.]+) s   in root_link: left foot: .*   right foot: x \S+',
+        done.stdout,
+        re.MULTILINE,
+    )
+    assert lines[-1] == '1.50' and 2 <= len(lines) <= 3
     # What was sent can be converted and drawn.
     assert run_main('bag', 'walk', 'poses').returncode == 0
     assert run_main('plot', 'poses').returncode == 0
@@ -119,7 +130,9 @@ def test_talks_inside_the_machine_in_a_domain_of_its_own(monkeypatch):
 
 
 def test_recording_is_played_in_its_own_timing():
-    times = np.cumsum(np.r_[5.0, np.tile([0.002, 0.04, 0.0], 17)[:49]])  # 0.7 s, from 5 s on
+    times = np.cumsum(
+        np.r_[5.0, np.tile([0.002, 0.04, 0.0], 17)[:49]]
+    )  # 0.7 s, from 5 s on
     write_csv(Path('walk.csv'), times, walk(0.49).positions)
     done = run_main('demo', '--recording', 'walk.csv', '-o', 'walk.svg')
     assert done.returncode == 0, done.stderr
@@ -136,8 +149,10 @@ def test_poses_received_are_those_of_the_chains(version, foot_frame):
     parameters = {'version': version, 'foot_frame': foot_frame}
     parameters |= replays.lossless(namespace, TIPS, 1000)
     gait = walk(0.5)
-    with closing(replays.Replay(gait, namespace, TIPS)) as replay, \
-            replays.running_node(namespace, parameters) as (_, check):
+    with (
+        closing(replays.Replay(gait, namespace, TIPS)) as replay,
+        replays.running_node(namespace, parameters) as (_, check),
+    ):
         replay.wait_for_node(check)
         replay.play(lambda elapsed: None, 0.1, check)
     chains = Catalog.load().select(LEGS, version)
@@ -148,11 +163,17 @@ def test_poses_received_are_those_of_the_chains(version, foot_frame):
         assert (answers.latencies > 0).all()
 
 
-@pytest.mark.parametrize(('missing', 'counts'), [
-    (slice(3, 5), r'18 +\(left_foot 10, right_foot 8\)\nlost +2\n'),
-    (slice(None), r'10 +\(left_foot 10, right_foot 0\)\nlost +10\n')])
+@pytest.mark.parametrize(
+    ('missing', 'counts'),
+    [
+        (slice(3, 5), r'18 +\(left_foot 10, right_foot 8\)\nlost +2\n'),
+        (slice(None), r'10 +\(left_foot 10, right_foot 0\)\nlost +10\n'),
+    ],
+)
 def test_lost_poses_are_reported_and_exit_1(capsys, missing, counts):
-    answers = [replays.Answers(tip, np.zeros((10, 7)), np.full(10, 1e-3)) for tip in TIPS]
+    answers = [
+        replays.Answers(tip, np.zeros((10, 7)), np.full(10, 1e-3)) for tip in TIPS
+    ]
     answers[1].latencies[missing] = np.nan
     assert conclude(answers, list(range(10)), True) == 1
     captured = capsys.readouterr()
@@ -162,14 +183,16 @@ def test_lost_poses_are_reported_and_exit_1(capsys, missing, counts):
 
 
 def test_node_that_refuses_its_parameters_is_one_line():
-    with pytest.raises(replays.DemoError, match=r'exit status 1: .*v9.*v2_5'), \
-            replays.running_node('/leg_fk_test', {'version': 'v9'}) as (_, check):
+    with (
+        pytest.raises(replays.DemoError, match=r'exit status 1: .*v9.*v2_5'),
+        replays.running_node('/leg_fk_test', {'version': 'v9'}) as (_, check),
+    ):
         wait_until(check)
 
 
 def test_node_that_dies_is_one_line_and_exit_1():
     process = start('--seconds', '60')
-    node, = wait_until(lambda: children(process.pid))
+    (node,) = wait_until(lambda: children(process.pid))
     read_until(process.stdout, 'right foot: x')
     os.kill(node, signal.SIGKILL)
     _, err = process.communicate(timeout=90)
@@ -178,11 +201,12 @@ def test_node_that_dies_is_one_line_and_exit_1():
     assert 'the node stopped with exit status -9' in err
 
 
-@pytest.mark.parametrize(('number', 'early'), [
-    (signal.SIGINT, True), (signal.SIGINT, False), (signal.SIGTERM, False)])
+@pytest.mark.parametrize(
+    ('number', 'early'), [(signal.SIGINT, False), (signal.SIGTERM, True)]
+)
 def test_signals_leave_no_process_and_no_file_behind(number, early):
     process = start('--seconds', '60', '--save', 'walk')
-    node, = wait_until(lambda: children(process.pid))
+    (node,) = wait_until(lambda: children(process.pid))
     if not early:
         read_until(process.stdout, 'right foot: x')
     process.send_signal(number)
@@ -197,9 +221,19 @@ def test_signals_leave_no_process_and_no_file_behind(number, early):
 def test_on_a_terminal_the_table_is_redrawn_in_place():
     pytest.importorskip('rich')
     controller, terminal = pty.openpty()
-    environment = {**os.environ, 'TERM': 'xterm-256color', 'COLUMNS': '90', 'LINES': '30'}
-    process = subprocess.Popen([*DEMO, '--seconds', '2'], stdin=terminal, stdout=terminal,
-                               stderr=terminal, env=environment)
+    environment = {
+        **os.environ,
+        'TERM': 'xterm-256color',
+        'COLUMNS': '90',
+        'LINES': '30',
+    }
+    process = subprocess.Popen(
+        [*DEMO, '--seconds', '1.5'],
+        stdin=terminal,
+        stdout=terminal,
+        stderr=terminal,
+        env=environment,
+    )
     os.close(terminal)
     written = b''
     while select.select([controller], [], [], 60)[0]:
@@ -211,23 +245,26 @@ def test_on_a_terminal_the_table_is_redrawn_in_place():
     assert process.wait(90) == 0
     shown = re.sub(r'\x1b\[[\d;?]*[A-Za-z]|\r', '', written.decode())
     table, _, summary = shown.partition('messages in')
-    assert 10 <= table.count('poses in root_link, in m') <= 25  # 10 a second
-    assert len(set(re.findall(r'left foot +(-?\d.*\d)', table))) >= 10  # it moves
+    assert 8 <= table.count('poses in root_link, in m') <= 20  # 10 a second
+    assert len(set(re.findall(r'left foot +(-?\d.*\d)', table))) >= 8  # it moves
     assert 'poses out' in summary and 'poses in' not in summary
 
 
-@pytest.mark.parametrize(('typed', 'named'), [
-    ('--version v9', ['v9', 'v2_5']),
-    ('--foot-frame toe', ['toe', 'sole']),
-    ('--seconds 0', ['--seconds', '0.1']),
-    ('-o demo.gif', ['.gif', '.png']),
-    ('-o none/demo.png', ['none']),
-    ('-o bad.csv.png --save none/walk', ['none']),
-    ('--save bad.csv', ['bad.csv', 'exists']),
-    ('--save kept.mcap', ['kept.mcap', '--force']),
-    ('--recording no.csv', ['no.csv']),
-    ('--recording bad.csv', ['bad.csv:3', 'column r_knee', "'1e+300'"]),
-])
+@pytest.mark.parametrize(
+    ('typed', 'named'),
+    [
+        ('--version v9', ['v9', 'v2_5']),
+        ('--foot-frame toe', ['toe', 'sole']),
+        ('--seconds 0', ['--seconds', '0.1']),
+        ('-o demo.gif', ['.gif', '.png']),
+        ('-o none/demo.png', ['none']),
+        ('-o bad.csv.png --save none/walk', ['none']),
+        ('--save bad.csv', ['bad.csv', 'exists']),
+        ('--save kept.mcap', ['kept.mcap', '--force']),
+        ('--recording no.csv', ['no.csv']),
+        ('--recording bad.csv', ['bad.csv:3', 'column r_knee', "'1e+300'"]),
+    ],
+)
 def test_bad_input_is_one_line_and_exit_2(typed, named):
     positions = np.zeros((2, 12))
     positions[1, JOINTS.index('r_knee')] = 1e300

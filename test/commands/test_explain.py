@@ -78,20 +78,25 @@ def test_the_frames_obey_the_first_four_steps_of_the_method(case):
 @given(chains_and_positions())
 def test_any_table_in_either_convention_is_explained(drawn):
     standard, (q, *_) = drawn
-    modified = replace(standard, links=standard_rows(standard.links), convention='modified')
+    modified = replace(
+        standard, links=standard_rows(standard.links), convention='modified'
+    )
     for chain in (standard, modified):
         e = explained(chain, q)
         assert np.abs(in_metres(e.T_root_tip) - chain.forward(q)).max() < 1e-12
         assert as_text(e) and as_latex(e)
 
 
-@pytest.mark.parametrize(('name', 'position'), [
-    ('left_leg=v1', 'x = 0, y = -68.1, z = -597.5'),
-    ('right_leg=v1', 'x = 0, y = 68.1, z = -597.5'),
-    ('left_leg=v2_5', 'x = 4.4175, y = -68.1, z = -622.995'),
-    ('right_leg=v2_5', 'x = 4.4175, y = 68.1, z = -622.995'),
-    ('head_imu=v2', 'x = 13, y = 6.6, z = 375.6'),
-])
+@pytest.mark.parametrize(
+    ('name', 'position'),
+    [
+        ('left_leg=v1', 'x = 0, y = -68.1, z = -597.5'),
+        ('right_leg=v1', 'x = 0, y = 68.1, z = -597.5'),
+        ('left_leg=v2_5', 'x = 4.4175, y = -68.1, z = -622.995'),
+        ('right_leg=v2_5', 'x = 4.4175, y = 68.1, z = -622.995'),
+        ('head_imu=v2', 'x = 13, y = 6.6, z = 375.6'),
+    ],
+)
 def test_at_zero_the_text_ends_with_the_documented_position(name, position):
     text = explain(name, '--degrees', *[0] * 6)
     assert f'is at {position} mm in root_link.' in text.splitlines()[-1]
@@ -116,9 +121,11 @@ def test_text_latex_and_json_give_the_same_answer(case):
 
 def test_numbers_stand_with_their_points_under_each_other():
     lines = LEG.explain('--degrees', 10, 12, 14, -30, -15, 5).splitlines()
-    first = next(i for i, line in enumerate(lines) if 'T_RoLf = T_Ro0 T_06 = [' in line) - 1
+    first = (
+        next(i for i, line in enumerate(lines) if 'T_RoLf = T_Ro0 T_06 = [' in line) - 1
+    )
     points = []
-    for line in lines[first:first + 3]:
+    for line in lines[first : first + 3]:
         points.append([match.start() for match in re.finditer(r'\.', line)])
     assert len(points[0]) == 4 and points[0] == points[1] == points[2]
 
@@ -135,7 +142,12 @@ def test_a_prismatic_arm_is_explained_as_the_textbook_has_it():
     # T_03 of Spong, Hutchinson and Vidyasagar's example 3.2, with d_1 = 400 and their d_2, d_3.
     assert text.count('T_RoE = T_Ro0 T_03 =') == 1
     rows = [' '.join(row.split()) for row in re.findall(r'\[([^]]*)\]', text)[-4:]]
-    assert rows == ['c_0 0 -s_0 -d_2 s_0', 's_0 0 c_0 c_0 d_2', '0 -1 0 d_1 + 400', '0 0 0 1']
+    assert rows == [
+        'c_0 0 -s_0 -d_2 s_0',
+        's_0 0 c_0 c_0 d_2',
+        '0 -1 0 d_1 + 400',
+        '0 0 0 1',
+    ]
     assert 'd_2      = q_2 + 150' in text and 'lift slides along it' in text
 
 
@@ -143,9 +155,15 @@ def test_the_steps_are_walked_in_order():
     text = LEG.explain('--degrees', *[0] * 6)
     places = [text.index(f'Step {i}.') for i in range(1, 7)]
     assert places == sorted(places)
-    for words in ('A_5 = T_56 = Rz(theta_5) tz(d_5) tx(a_5) Rx(alpha_5)', 'T_06 = T_05 A_5',
-                  'T_Ro0 =', 'T_RoLf = T_Ro0 T_06', 'z_2 ends, 0.9175 mm away',
-                  'z_0 and z_1 meet here', 'z_4 parallel to z_3, 200.5 mm away'):
+    for words in (
+        'A_5 = T_56 = Rz(theta_5) tz(d_5) tx(a_5) Rx(alpha_5)',
+        'T_06 = T_05 A_5',
+        'T_Ro0 =',
+        'T_RoLf = T_Ro0 T_06',
+        'z_2 ends, 0.9175 mm away',
+        'z_0 and z_1 meet here',
+        'z_4 parallel to z_3, 200.5 mm away',
+    ):
         assert words in text
 
 
@@ -166,24 +184,33 @@ def test_text_and_json_give_the_same_ranges(case):
 def test_rows_that_follow_another_joint_are_named_as_such():
     text = ODD.explain()
     assert 'a row that follows elbow turns about it' in text
-    table = [' '.join(line.split()) for line in text.splitlines() if line.startswith('  i = ')]
+    table = [
+        ' '.join(line.split())
+        for line in text.splitlines()
+        if line.startswith('  i = ')
+    ]
     assert table[1] == 'i = 1 250 0 pi -40.107 - (-90 -> +90) elbow'
-    assert table[5:] == ['i = 5 30 0 -pi/2 5.7296 + 0.5 q follows elbow',
-                         'i = 6 0 200 + 0.349066 q 0 0 follows shoulder']  # mm per degree
+    assert table[5:] == [
+        'i = 5 30 0 -pi/2 5.7296 + 0.5 q follows elbow',
+        'i = 6 0 200 + 0.349066 q 0 0 follows shoulder',
+    ]  # mm per degree
     assert 'theta_5 = 0.5 q_1 + 0.1' in text and 'd_6 = 20 q_0 + 200' in text
 
 
-@pytest.mark.parametrize(('words', 'complaint'), [
-    ([], 'CHAIN'),
-    (['left_foot'], "unknown chain 'left_foot'"),
-    (['left_leg', '--version', 'v4'], 'known: v1, v2_5, v3'),
-    (['left_leg', '--foot-frame', 'toe'], 'known: dh, sole'),
-    (['left_leg', '--degrees', '1', '2'], 'in the order l_hip_pitch'),
-    (['left_leg', '--degrees', 'x'], "'x'"),
-    (['left_leg', '--json', '--latex'], 'not allowed with'),
-    (['left_leg', '--degrees', '1', '--radians', '1'], 'not allowed with'),
-    (['left_leg', '-k', 'missing.yaml'], 'missing.yaml'),
-])
+@pytest.mark.parametrize(
+    ('words', 'complaint'),
+    [
+        ([], 'CHAIN'),
+        (['left_foot'], "unknown chain 'left_foot'"),
+        (['left_leg', '--version', 'v4'], 'known: v1, v2_5, v3'),
+        (['left_leg', '--foot-frame', 'toe'], 'known: dh, sole'),
+        (['left_leg', '--degrees', '1', '2'], 'in the order l_hip_pitch'),
+        (['left_leg', '--degrees', 'x'], "'x'"),
+        (['left_leg', '--json', '--latex'], 'not allowed with'),
+        (['left_leg', '--degrees', '1', '--radians', '1'], 'not allowed with'),
+        (['left_leg', '-k', 'missing.yaml'], 'missing.yaml'),
+    ],
+)
 def test_a_mistake_is_one_line_and_exit_2(words, complaint, capsys):
     assert main(['explain', *words]) == 2
     output, error = capsys.readouterr()
@@ -194,8 +221,10 @@ def test_a_mistake_is_one_line_and_exit_2(words, complaint, capsys):
 def test_joints_outside_their_range_are_said_as_in_pose():
     outside = ['--degrees', 0, -30, 0, 0, 0, 0]
     text = LEG.explain(*outside)
-    note = ' '.join(text[text.index('note:'):].split())
-    assert note.startswith('note: l_hip_roll = -30 deg is outside its range -20 .. 120 deg')
+    note = ' '.join(text[text.index('note:') :].split())
+    assert note.startswith(
+        'note: l_hip_roll = -30 deg is outside its range -20 .. 120 deg'
+    )
     assert 'never clamped' in note
     assert 'never clamped' in LEG.explain('--latex', *outside)
     assert 'note:' not in LEG.explain('--degrees', 0, 30, 0, 0, 0, 0)
@@ -203,5 +232,7 @@ def test_joints_outside_their_range_are_said_as_in_pose():
 
 def test_the_head_sensors_transform_is_the_fixed_row_of_its_document():
     text = HEAD.explain('--degrees', *[0] * 6)
-    assert 'T_nIs equals a last fixed row: a = 0, d = 6.6, alpha = pi/2, theta = 0' in text
+    assert (
+        'T_nIs equals a last fixed row: a = 0, d = 6.6, alpha = pi/2, theta = 0' in text
+    )
     assert 'z_Is = ( 0 0 1) as T_nIs has it' in ' '.join(text.split())

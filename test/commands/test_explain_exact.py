@@ -1,5 +1,6 @@
 """`leg_fk explain` with sympy: exact numbers, formulas, and the LaTeX of both."""
 
+from itertools import product
 import json
 import re
 import shutil
@@ -9,11 +10,24 @@ import sys
 from icub_leg_fk.__main__ import main
 import numpy as np
 import pytest
-from support.explain_cases import Case, HEAD, in_metres, LEG, ODD_ARM, one_chain_of_each_kind, UR5
+from support.explain_cases import (
+    Case,
+    HEAD,
+    in_metres,
+    LEG,
+    ODD_ARM,
+    OF_EACH_KIND,
+    one_chain_of_each_kind,
+    UR5,
+)
 
 sympy = pytest.importorskip('sympy')
 
-LONG_ARM = """\
+FORMS = ['formula', 'decimals', 'exact']
+in_each_form = pytest.mark.parametrize('form', FORMS)
+
+LONG_ARM = (
+    """\
 units: {length: mm, angle: deg}
 chains:
   arm:
@@ -27,8 +41,10 @@ chains:
           - {a: 0, d: 0, alpha: 90, type: prismatic}
           - {a: 10, d: 0, alpha: 0}
           - {a: 0, d: 0, alpha: 90}
-""" + 9 * '          - {a: 0, d: 0, alpha: 0, type: prismatic}\n' + (
-    '          - {a: 10, d: 0, alpha: 0}\n')
+"""
+    + 9 * '          - {a: 0, d: 0, alpha: 0, type: prismatic}\n'
+    + ('          - {a: 10, d: 0, alpha: 0}\n')
+)
 """More than ten joints, of which 1 and 2 turn about parallel axes, and 12 turns too."""
 
 
@@ -68,9 +84,28 @@ def test_exact_numbers_are_the_chains_pose(case):
 
 def test_right_angles_and_lengths_are_exact():
     e = LEG.json('--symbolic', '--degrees', 0, 0, 0, -30, 0, 0)
-    assert [link['alpha'] for link in e['links']] == ['-pi/2', '-pi/2', 'pi/2', 'pi', '-pi/2', '0']
-    assert [link['theta'] for link in e['links']][:4] == ['pi/2', 'pi/2', '-pi/2', 'pi/3']
-    assert [link['a'] for link in e['links']] == ['0', '0', '-367/400', '-401/2', '0', '-1361/20']
+    assert [link['alpha'] for link in e['links']] == [
+        '-pi/2',
+        '-pi/2',
+        'pi/2',
+        'pi',
+        '-pi/2',
+        '0',
+    ]
+    assert [link['theta'] for link in e['links']][:4] == [
+        'pi/2',
+        'pi/2',
+        '-pi/2',
+        'pi/3',
+    ]
+    assert [link['a'] for link in e['links']] == [
+        '0',
+        '0',
+        '-367/400',
+        '-401/2',
+        '0',
+        '-1361/20',
+    ]
     assert not re.search(r'\d\.\d', json.dumps(e['T_root_tip']))
     assert sympy.sympify(e['T_root_tip'][2][0]) == sympy.sqrt(3) / 2
 
@@ -114,22 +149,24 @@ for form in ([], ['--json'], ['--latex']):
     assert main(['explain', 'left_leg', *form, *zeros]) == 0
 sys.exit(main(['explain', 'left_leg']))
 """
-    done = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True,
-                          timeout=60)
+    done = subprocess.run(
+        [sys.executable, '-c', program], capture_output=True, text=True, timeout=60
+    )
     assert done.returncode == 2, done.stderr
     assert done.stderr.count('\n') == 1 and 'pip install sympy' in done.stderr
 
 
-@pytest.fixture(params=['formula', 'decimals', 'exact'])
-def document(request, case):
+def latex(case, form):
     """Return a chain's explanation in LaTeX."""
     _, words = case.radians(7)
     forms = {'formula': [], 'decimals': words, 'exact': [*words, '--symbolic']}
-    return case.explain('--latex', *forms[request.param])
+    return case.explain('--latex', *forms[form])
 
 
+@in_each_form
 @one_chain_of_each_kind
-def test_latex_is_complete(document, case):
+def test_latex_is_complete(case, form):
+    document = latex(case, form)
     assert document.startswith(r'\documentclass')
     assert document.rstrip().endswith(r'\end{document}')
     assert f'{len(case.chain.rows()) - 1}}}' in document
@@ -139,8 +176,10 @@ def test_latex_is_complete(document, case):
         assert [row.count('&') for row in matrix.split(r'\\')] == [3, 3, 3, 3]
 
 
+@in_each_form
 @one_chain_of_each_kind
-def test_latex_is_balanced(document, case):
+def test_latex_is_balanced(case, form):
+    document = latex(case, form)
     is_open = ['']
     for kind, name in re.findall(r'\\(begin|end)\{([a-z]+)\}', document):
         if kind == 'begin':
@@ -158,11 +197,19 @@ def test_latex_is_balanced(document, case):
 
 
 @pytest.mark.skipif(not shutil.which('pdflatex'), reason='pdflatex is not installed')
-@one_chain_of_each_kind
-def test_latex_takes_the_document_and_no_line_is_too_long(document, case, tmp_path):
-    (tmp_path / 'e.tex').write_text(document)
-    done = subprocess.run(['pdflatex', '-interaction=nonstopmode', 'e.tex'], cwd=tmp_path,
-                          capture_output=True, timeout=60)
+def test_latex_takes_the_documents_and_no_line_is_too_long(tmp_path):
+    begin, end = r'\begin{document}', r'\end{document}'
+    bodies = []
+    for case, form in product(OF_EACH_KIND, FORMS):
+        head, _, body = latex(case, form).partition(begin)
+        bodies.append(body.partition(end)[0])
+    (tmp_path / 'e.tex').write_text(f'{head}{begin}{"".join(bodies)}{end}')
+    done = subprocess.run(
+        ['pdflatex', '-draftmode', '-interaction=nonstopmode', 'e.tex'],
+        cwd=tmp_path,
+        capture_output=True,
+        timeout=60,
+    )
     assert done.returncode == 0
     assert 'Overfull' not in (tmp_path / 'e.log').read_text(encoding='latin-1')
 
@@ -171,4 +218,7 @@ def test_minus_signs_and_spaces_in_latex():
     document = HEAD.explain('--latex', '--degrees', 0, 0, 0, -30, 0, 0)
     assert r'= (-0.5,\ 0,\ 0.866)' in document
     assert r'neck\_pitch $-$30 deg' in document
-    assert r'R_{z}(\theta _{0})\,t_{z}(d_{0})\,t_{x}(a_{0})\,R_{x}(\alpha _{0})' in document
+    assert (
+        r'R_{z}(\theta _{0})\,t_{z}(d_{0})\,t_{x}(a_{0})\,R_{x}(\alpha _{0})'
+        in document
+    )

@@ -13,11 +13,20 @@ def test_the_text_names_chains_versions_axes_joints_and_tip_frames():
     text = run_main('list').stdout
     for chain in ('left_leg', 'right_leg', 'head_imu'):
         assert f'\n{chain}\n' in text
-    for words in ('l_hip_pitch  l_hip_roll  l_hip_yaw  l_knee  l_ankle_pitch  l_ankle_roll',
-                  'dh: l_foot_dh_frame', 'sole: r_sole', 'dh: imu_frame', 'v2_5  (default)',
-                  'v1, v2_5: x backward, y right, z up', 'v3: x forward, y left, z up'):
+    for words in (
+        'l_hip_pitch  l_hip_roll  l_hip_yaw  l_knee  l_ankle_pitch  l_ankle_roll',
+        'dh: l_foot_dh_frame',
+        'sole: r_sole',
+        'dh: imu_frame',
+        'v2_5  (default)',
+        'v1, v2_5: x backward, y right, z up',
+        'v3: x forward, y left, z up',
+    ):
         assert words in text
-    assert text.count('v3  (iKin, versions from 3.0 on, in the root frame of iCubGenova09') == 2
+    assert (
+        text.count('v3  (iKin, versions from 3.0 on, in the root frame of iCubGenova09')
+        == 2
+    )
     assert text.count('(default)') == 3
     assert max(map(len, text.splitlines()[1:])) <= 100
 
@@ -25,18 +34,39 @@ def test_the_text_names_chains_versions_axes_joints_and_tip_frames():
 def test_json_holds_the_same():
     listed = json.loads(run_main('list', '--json').stdout)
     assert set(listed) == {'file', 'chains'}
-    chains = {chain['name']: chain for chain in listed['chains']}
-    assert list(chains) == ['left_leg', 'right_leg', 'head_imu']
-    left = chains['left_leg']
-    assert set(left) == {'name', 'tip', 'root_frame', 'joints', 'tip_frames', 'versions'}
+    left, right, head = listed['chains']
+    assert (left['name'], right['name'], head['name']) == (
+        'left_leg',
+        'right_leg',
+        'head_imu',
+    )
+    assert set(left) == {
+        'name',
+        'tip',
+        'root_frame',
+        'joints',
+        'tip_frames',
+        'versions',
+    }
     assert left['tip_frames'] == {'dh': 'l_foot_dh_frame', 'sole': 'l_sole'}
     assert left['joints'][3] == 'l_knee' and len(left['joints']) == 6
-    v1, v2_5, v3 = left['versions']
-    assert [version['name'] for version in (v1, v2_5, v3)] == ['v1', 'v2_5', 'v3']
-    assert [version['default'] for version in (v1, v2_5, v3)] == [False, True, False]
-    assert [bool(version['source']) for version in (v1, v2_5, v3)] == [False, False, True]
-    assert v2_5['root_axes'] == ['backward', 'right', 'up']
-    assert v3['root_axes'] == ['forward', 'left', 'up']
+
+
+@pytest.mark.parametrize(
+    ('index', 'name', 'is_default', 'root_axes'),
+    [
+        (0, 'v1', False, ['backward', 'right', 'up']),
+        (1, 'v2_5', True, ['backward', 'right', 'up']),
+        (2, 'v3', False, ['forward', 'left', 'up']),
+    ],
+)
+def test_json_describes_each_version(index, name, is_default, root_axes):
+    left = json.loads(run_main('list', '--json').stdout)['chains'][0]
+    assert len(left['versions']) == 3
+    version = left['versions'][index]
+    assert (version['name'], version['default']) == (name, is_default)
+    assert bool(version['source']) == (name == 'v3')
+    assert version['root_axes'] == root_axes
 
 
 def test_a_file_of_ones_own_is_listed():
@@ -44,15 +74,24 @@ def test_a_file_of_ones_own_is_listed():
         listed = json.loads(run_main('list', option, ARM, '--json').stdout)
         assert listed['file'] == str(ARM)
         (arm,) = listed['chains']
-        assert arm['versions'][0]['joint_types'] == ['revolute', 'prismatic', 'prismatic']
-    assert 'axes' not in run_main('list', '-k', ARM).stdout  # of which the file says nothing
+        assert arm['versions'][0]['joint_types'] == [
+            'revolute',
+            'prismatic',
+            'prismatic',
+        ]
+    assert (
+        'axes' not in run_main('list', '-k', ARM).stdout
+    )  # of which the file says nothing
 
 
-@pytest.mark.parametrize(('old', 'new', 'complaint'), [
-    ('units:', 'unit:', 'unit'),
-    ('prismatic', 'sliding', "'sliding', allowed: revolute or prismatic"),
-    ('range: [0, 500]', 'range: [500, 0]', 'lower at most upper'),
-])
+@pytest.mark.parametrize(
+    ('old', 'new', 'complaint'),
+    [
+        ('units:', 'unit:', 'unit'),
+        ('prismatic', 'sliding', "'sliding', allowed: revolute or prismatic"),
+        ('range: [0, 500]', 'range: [500, 0]', 'lower at most upper'),
+    ],
+)
 def test_a_mistake_in_the_file_is_one_line(tmp_path, old, new, complaint):
     file = tmp_path / 'arm.yaml'
     file.write_text(ARM.read_text().replace(old, new))

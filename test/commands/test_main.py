@@ -14,6 +14,7 @@ from icub_leg_fk.__main__ import COMMANDS, main
 from icub_leg_fk.kinematics import Catalog, config_file
 import pytest
 from support.leg_fk_process import COMMAND, leg_fk, run_main
+from support.robots import joint, robot
 
 ARM = config_file('examples/cylindrical_arm.yaml')
 ZEROS = '0 0 0 0 0 0'
@@ -36,25 +37,43 @@ ANSWERS = [
     ('plot x.csv --ouput y', 2, 'did you mean --output?'),
     ('demo --colour', 2, 'unknown option --colour (see leg_fk demo -h)'),
     # Chains, versions and frames.
-    (f'pose left_arm --degrees {ZEROS}', 2, "'left_arm'; known: left_leg, right_leg, head_imu"),
+    (
+        f'pose left_arm --degrees {ZEROS}',
+        2,
+        "'left_arm'; known: left_leg, right_leg, head_imu",
+    ),
     (f'pose Left_Leg --degrees {ZEROS}', 2, "did you mean 'left_leg'?"),
     (f'pose left_foot --degrees {ZEROS}', 2, 'left_foot is the tip of left_leg'),
-    (f'pose r_sole --degrees {ZEROS}', 2, 'r_sole is right_leg with --foot-frame sole'),
-    (f'pose left_leg --version V2_5 --degrees {ZEROS}', 2,
-     "'V2_5'; did you mean 'v2_5'? known: v1, v2_5, v3"),
+    (f'pose r_sole --degrees {ZEROS}', 2, 'r_sole is the sole frame of right_leg'),
+    (
+        f'pose left_leg --version V2_5 --degrees {ZEROS}',
+        2,
+        "'V2_5' of chain left_leg; did you mean 'v2_5'? known: v1, v2_5, v3",
+    ),
     (f'pose left_leg=v9 --degrees {ZEROS}', 2, 'known: v1, v2_5, v3'),
-    (f'pose left_leg --version "" --degrees {ZEROS}', 2, 'is empty; leave it out for its default'),
+    (
+        f'pose left_leg --version "" --degrees {ZEROS}',
+        2,
+        'is empty; leave it out for its default',
+    ),
     (f'pose left_leg --foot-frame toe --degrees {ZEROS}', 2, 'known: dh, sole'),
     (f'pose head_imu --foot-frame sole --degrees {ZEROS}', 2, 'known: dh'),
-    (f'pose left_leg -k "" --degrees {ZEROS}', 2, 'is empty; leave it out for its default'),
+    (
+        f'pose left_leg -k "" --degrees {ZEROS}',
+        2,
+        'is empty; leave it out for its default',
+    ),
     (f'pose left_leg -k none.yaml --degrees {ZEROS}', 2, 'none.yaml'),
     ('list -k .', 2, 'cannot read .'),
     # Joint positions.
     ('pose left_leg', 2, 'one of the arguments --degrees --radians is required'),
     ('pose left_leg --degrees', 2, 'expected at least one argument'),
     ('pose left_leg --degrees 0 --radians 0', 2, 'not allowed with'),
-    ('pose left_leg --degrees 0 0 0 0 0', 2,
-     'has 5 entries; allowed: 6, in the order l_hip_pitch l_hip'),
+    (
+        'pose left_leg --degrees 0 0 0 0 0',
+        2,
+        'has 5 entries; allowed: 6, in the order l_hip_pitch l_hip',
+    ),
     (f'pose left_leg --degrees {ZEROS} 0', 2, 'has 7 entries; allowed: 6'),
     ('pose left_leg --degrees 0 zero', 2, "found 'zero', allowed: finite numbers"),
     ('pose left_leg --degrees 0 nan', 2, "found 'nan', allowed: finite numbers"),
@@ -64,9 +83,16 @@ ANSWERS = [
     ('pose left_leg --degrees 1_0', 2, "found '1_0'"),
     ('pose left_leg --degrees 10,-20,30', 2, 'numbers are separated by spaces'),
     ('pose left_leg --degrees -10,-20,30', 2, 'numbers are separated by spaces'),
-    (f'pose --degrees {ZEROS} left_leg', 2, "found 'left_leg', allowed: finite numbers"),
-    ('pose left_leg --radians 10 20 0 0 0 0', 0,
-     'look like degrees, for which there is --degrees: l_hip_pitch 10, l_hip_roll 20'),
+    (
+        f'pose --degrees {ZEROS} left_leg',
+        2,
+        "found 'left_leg', allowed: finite numbers",
+    ),
+    (
+        'pose left_leg --radians 10 20 0 0 0 0',
+        0,
+        'look like degrees, for which there is --degrees: l_hip_pitch 10, l_hip_roll 20',
+    ),
     # urdf.
     ('urdf elbow', 2, "unknown chain 'elbow'"),
     ('urdf left_foot', 2, 'left_foot is the tip of left_leg'),
@@ -83,7 +109,79 @@ ANSWERS = [
     ('urdf left_leg -o -x.urdf', 2, 'unknown option -x.urdf'),
     ('urdf left_leg -o /dev/null', 2, '/dev/null'),
     ('urdf left_leg -o /no/such/folder/x.urdf', 2, 'there is no directory'),
+    (
+        'urdf left_leg -o /proc/x.urdf',
+        2,
+        '/proc/x.urdf: cannot be written: no such file',
+    ),
+    ('urdf left_leg -o ""', 2, "'': is not the name of a file"),
+    ('urdf left_leg -o /', 2, "'/': is not the name of a file"),
+    ('demo -o /proc/x.png', 2, '/proc/x.png: cannot be written: no such file'),
+    ('demo -o ""', 2, 'is not the name of a file'),
+    ('demo --save /proc/x', 2, '/proc/x: cannot be written: no such file'),
 ]
+
+# Files that are not what is asked for.
+FILES = {
+    'empty': b' \n',
+    'bytes': bytes(range(256)),
+    'text.txt': b'left_leg',
+    'arm.yaml': ARM.read_bytes(),
+    'page.html': b'<!DOCTYPE html><html/>',
+    'links.urdf': b'<robot name="r"><link name="base"/><link name="base2"/></robot>',
+    'link.urdf': b'<robot name="r"><link name="base"/></robot>',
+    'nothing.urdf': b'<robot name="r"/>',
+    'utf16.urdf': '<robot name="r"><link name="base"/></robot>'.encode('utf-16'),
+    'arm.urdf': robot([joint(0), joint(1)]).encode(),
+    'arm.xacro': b'<robot xmlns:xacro="x"><xacro:include filename="f"/></robot>',
+}
+
+# What is typed, and words of the answer, whose exit status is 2.
+ANSWERS_ON_FILES = [
+    ('list -k empty', 'found nothing, allowed: units and chains'),
+    ('list -k bytes', 'not printable UTF-8 text'),
+    ('list -k text.txt', "found 'left_leg', allowed: a mapping with units"),
+    ('list -k page.html', 'is not a URDF: its root is <html>'),
+    ('list -k link.urdf', 'has no chain: no joint moves a link at its ends'),
+    ('list -k links.urdf', 'has 2 links at the top (base, base2)'),
+    ('list -k nothing.urdf', 'has no links'),
+    ('list -k utf16.urdf', 'is UTF-16 text; allowed: UTF-8'),
+    ('list -k arm.xacro', 'xacro arm.xacro > robot.urdf'),
+    ('urdf -k link.urdf', 'has no chain'),
+    ('list -k arm.urdf --root l9', "unknown link 'l9' of arm.urdf; "),
+    ('list -k arm.urdf --root ""', '--root is empty; leave it out for its default'),
+    (
+        'pose l2 -k arm.urdf --root l1 --degrees 0 0',
+        '2 entries; allowed: 1, in the order j1',
+    ),
+    ('explain l1 -k arm.urdf --root l1', "no joint moves between 'l1' and 'l1'"),
+    ('pose left_leg -k arm.urdf --degrees 0', "unknown chain 'left_leg'; known: l2"),
+    ('table empty', 'is empty'),
+    ('table ""', "cannot read '': no such file"),
+    ('table text.txt', 'it has no element'),
+    ('table arm.yaml', 'is a kinematics file; allowed here: a URDF'),
+    ('table link.urdf', 'has no chain'),
+    ('table nothing.urdf', 'has no links'),
+    ('table arm.urdf', "has none of the iCub's chains; give --tips, such as l2"),
+    ('table arm.urdf --tips l9', "unknown chain 'l9'"),
+    ('compare arm.yaml', 'is a kinematics file; allowed here: a URDF'),
+    ('compare arm.urdf', '-k takes tables with the names of this robot'),
+    ('compare arm.urdf --chains left_leg=v9', "unknown version 'v9' of chain left_leg"),
+    ('compare arm.urdf --chains l_sole', 'l_sole is the sole frame of left_leg'),
+]
+
+
+@pytest.mark.parametrize(('typed', 'answer'), ANSWERS_ON_FILES)
+def test_an_answer_on_a_wrong_file_is_one_line_that_helps(
+    typed, answer, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    for name, content in FILES.items():
+        Path(name).write_bytes(content)
+    done = run_main(*shlex.split(typed))
+    assert (done.returncode, done.stdout) == (2, '')
+    assert done.stderr.startswith('leg_fk: error: ') and done.stderr.count('\n') == 1
+    assert answer in done.stderr
 
 
 @pytest.mark.parametrize(('typed', 'status', 'answer'), ANSWERS)
@@ -98,14 +196,27 @@ def test_an_answer_is_one_line_that_helps(typed, status, answer, tmp_path, monke
 
 
 def test_answers_are_as_good_in_the_c_locale(tmp_path):
-    program = ('import shlex, sys; from icub_leg_fk.__main__ import main; '
-               'print([main(shlex.split(typed)) for typed in sys.argv[1:]])')
+    program = (
+        'import shlex, sys; from icub_leg_fk.__main__ import main; '
+        'print([main(shlex.split(typed)) for typed in sys.argv[1:]])'
+    )
     rows = [row for row in ANSWERS if row[1] == 2]
     rows.append(('pose left_l\u00e9g --degrees 0', 2, 'unknown chain'))
     done = subprocess.run(
-        [sys.executable, '-X', 'utf8=0', '-c', program, *(typed for typed, _, _ in rows)],
-        capture_output=True, text=True, cwd=tmp_path, timeout=60,
-        env={**os.environ, 'LC_ALL': 'C', 'PYTHONCOERCECLOCALE': '0'})
+        [
+            sys.executable,
+            '-X',
+            'utf8=0',
+            '-c',
+            program,
+            *(typed for typed, _, _ in rows),
+        ],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        timeout=60,
+        env={**os.environ, 'LC_ALL': 'C', 'PYTHONCOERCECLOCALE': '0'},
+    )
     assert done.stdout == f'{[status for _, status, _ in rows]}\n'
     lines = done.stderr.splitlines()
     for (_, _, answer), line in zip(rows, lines, strict=True):
@@ -133,15 +244,24 @@ def test_every_command_has_help_with_examples(command):
 
 def test_a_usage_line_works_as_typed():
     usage = run_main('pose', '-h').stdout.splitlines()[0]
-    assert usage == 'usage: leg_fk pose CHAIN (--degrees Q ... | --radians Q ...) [options]'
-    assert run_main('pose', 'left_leg', '--degrees', *ZEROS.split(), '--json').returncode == 0
+    assert (
+        usage
+        == 'usage: leg_fk pose CHAIN (--degrees Q ... | --radians Q ...) [options]'
+    )
+    assert (
+        run_main('pose', 'left_leg', '--degrees', *ZEROS.split(), '--json').returncode
+        == 0
+    )
     assert 'usage: leg_fk urdf [CHAIN ...] [options]' in run_main('urdf', '-h').stdout
 
 
 def test_options_may_stand_anywhere():
     expected = run_main('urdf', 'left_leg', 'right_leg', '--version', 'v1')
     assert expected.returncode == 0 and 'right_leg v1' in expected.stdout
-    for words in ('left_leg --version v1 right_leg', '--version v1 left_leg right_leg=v1'):
+    for words in (
+        'left_leg --version v1 right_leg',
+        '--version v1 left_leg right_leg=v1',
+    ):
         assert run_main('urdf', *words.split()).stdout == expected.stdout
 
 
@@ -156,10 +276,13 @@ def test_the_package_shows_its_api_and_nothing_else():
 
 
 def test_a_command_imports_its_own_module_and_no_optional_library():
-    program = ('import sys; from icub_leg_fk.__main__ import main; main(["list"]); '
-               "print(*sorted(sys.modules), sep='\\n', file=sys.stderr)")
-    done = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True,
-                          timeout=60)
+    program = (
+        'import sys; from icub_leg_fk.__main__ import main; main(["list"]); '
+        "print(*sorted(sys.modules), sep='\\n', file=sys.stderr)"
+    )
+    done = subprocess.run(
+        [sys.executable, '-c', program], capture_output=True, text=True, timeout=60
+    )
     assert done.returncode == 0
     modules = set(done.stderr.split())
     assert {'sympy', 'matplotlib', 'rosbags', 'rclpy', 'rich'}.isdisjoint(modules)
@@ -168,13 +291,19 @@ def test_a_command_imports_its_own_module_and_no_optional_library():
 
 
 def test_help_is_there_at_once():
-    def cpu_seconds(*words):  # the machine may be busy, so the best of three, in CPU time
+    def cpu_seconds(
+        *words,
+    ):  # the machine may be busy, so the best of three, in CPU time
         runs = []
         for _ in range(3):
             before = resource.getrusage(resource.RUSAGE_CHILDREN)
-            subprocess.run([sys.executable, *words], stdout=subprocess.DEVNULL, check=True)
+            subprocess.run(
+                [sys.executable, *words], stdout=subprocess.DEVNULL, check=True
+            )
             after = resource.getrusage(resource.RUSAGE_CHILDREN)
-            runs.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+            runs.append(
+                after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+            )
         return min(runs)
 
     assert cpu_seconds(*COMMAND[1:], '-h') < 2 * cpu_seconds('-c', 'import numpy, yaml')
@@ -185,8 +314,9 @@ def test_a_reader_that_leaves_ends_the_command_quietly(command):
     reading, writing = os.pipe()
     os.close(reading)
     with os.fdopen(writing, 'w') as output:
-        done = subprocess.run([*COMMAND, command], stdout=output, stderr=subprocess.PIPE,
-                              timeout=60)
+        done = subprocess.run(
+            [*COMMAND, command], stdout=output, stderr=subprocess.PIPE, timeout=60
+        )
     assert done.stderr == b''
     # argparse itself keeps silent about help that nobody reads, where output is unbuffered.
     assert done.returncode == 128 + signal.SIGPIPE or command == '-h'
@@ -196,15 +326,20 @@ def test_a_full_disk_is_reported_in_one_line():
     if not Path('/dev/full').exists():
         pytest.skip('no /dev/full here')
     with open('/dev/full', 'w') as output:
-        done = subprocess.run([*COMMAND, 'list'], stdout=output, stderr=subprocess.PIPE, text=True,
-                              timeout=60)
+        done = subprocess.run(
+            [*COMMAND, 'list'],
+            stdout=output,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=60,
+        )
     assert done.returncode == 2
     assert done.stderr.startswith('leg_fk: error: ') and done.stderr.count('\n') == 1
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_the_command_quietly(monkeypatch, number):
-    monkeypatch.setattr(Catalog, 'load', lambda path: signal.raise_signal(number))
+    monkeypatch.setattr(Catalog, 'load', lambda *_, **__: signal.raise_signal(number))
     done = run_main('list')
     assert (done.returncode, done.stdout, done.stderr) == (128 + number, '', '')
 
@@ -212,7 +347,7 @@ def test_a_signal_ends_the_command_quietly(monkeypatch, number):
 def test_a_signal_that_is_ignored_as_by_nohup_stays_so(monkeypatch):
     shipped = Catalog.load()
 
-    def load(path):
+    def load(*_, **__):
         signal.raise_signal(signal.SIGHUP)
         return shipped
 
@@ -224,31 +359,54 @@ def test_a_signal_that_is_ignored_as_by_nohup_stays_so(monkeypatch):
         signal.signal(signal.SIGHUP, before)
 
 
-def test_a_terminal_without_utf_8_gets_escapes_instead_of_an_error(tmp_path, monkeypatch):
+def test_a_terminal_without_utf_8_gets_escapes_instead_of_an_error(
+    tmp_path, monkeypatch
+):
     file = tmp_path / 'arm.yaml'
     links = '        links:'
-    file.write_text(ARM.read_text().replace(links, f'        source: "M\u00fcller"\n{links}'),
-                    encoding='utf-8')
+    file.write_text(
+        ARM.read_text().replace(links, f'        source: "M\u00fcller"\n{links}'),
+        encoding='utf-8',
+    )
     terminal = io.TextIOWrapper(io.BytesIO(), encoding='ascii')
     monkeypatch.setattr(sys, 'stdout', terminal)
     assert main(['list', '-k', str(file)]) == 0
     assert b'M\\xfcller' in terminal.buffer.getvalue()
 
 
-@pytest.mark.parametrize(('line', 'offered'), [
-    ('leg_fk po', {'pose', 'poses'}),
-    ('leg_fk pose --deg', {'--degrees'}),
-    ('leg_fk pose left', {'left_leg'}),
-    ('leg_fk pose head_imu=', {'v2'}),
-    ('leg_fk pose left_leg --version v2', {'v2_5'}),
-    ('leg_fk urdf left_leg head_imu --version v2', {'v2', 'v2_5'}),
-    ('leg_fk pose head_imu --foot-frame ', {'dh'}),
-    (f'leg_fk pose -k {config_file("examples/ur5.yaml")} ur5 --version ', {'series_3'}),
-])
+@pytest.mark.parametrize(
+    ('line', 'offered'),
+    [
+        ('leg_fk po', {'pose', 'poses'}),
+        ('leg_fk pose --deg', {'--degrees'}),
+        ('leg_fk pose left', {'left_leg'}),
+        ('leg_fk pose head_imu=', {'v2', 'v3'}),
+        ('leg_fk pose left_leg --version v2', {'v2_5'}),
+        ('leg_fk urdf left_leg head_imu --version v2', {'v2', 'v2_5'}),
+        ('leg_fk pose head_imu --foot-frame ', {'dh'}),
+        (
+            f'leg_fk pose -k {config_file("examples/ur5.yaml")} ur5 --version ',
+            {'series_3'},
+        ),
+    ],
+)
 def test_the_shell_is_offered_what_fits(line, offered, tmp_path):
     pytest.importorskip('argcomplete')
     answer = tmp_path / 'answer'
-    leg_fk(environment={'_ARGCOMPLETE': '1', 'COMP_LINE': line, 'COMP_POINT': str(len(line)),
-                        '_ARGCOMPLETE_IFS': '\n', '_ARGCOMPLETE_STDOUT_FILENAME': str(answer),
-                        '_ARGCOMPLETE_COMP_WORDBREAKS': '='})
+    leg_fk(
+        environment={
+            '_ARGCOMPLETE': '1',
+            'COMP_LINE': line,
+            'COMP_POINT': str(len(line)),
+            '_ARGCOMPLETE_IFS': '\n',
+            '_ARGCOMPLETE_STDOUT_FILENAME': str(answer),
+            '_ARGCOMPLETE_COMP_WORDBREAKS': '=',
+        }
+    )
     assert {word.strip() for word in answer.read_text().splitlines()} == offered
+
+
+def test_a_closed_stderr_leaves_standard_output_alone(monkeypatch, capsys):
+    monkeypatch.setattr(sys, 'stderr', None)
+    assert main(['lsit']) == 2
+    assert capsys.readouterr().out == ''

@@ -27,25 +27,37 @@ def notes(*words):
     return ' '.join(done.stdout.partition('note:')[2].split())
 
 
-@pytest.mark.parametrize(('words', 'position'), [
-    (['left_leg=v1'], (0, -0.0681, -0.5975)),
-    (['right_leg', '--version', 'v1'], (0, 0.0681, -0.5975)),
-    (['left_leg'], (0.0044175, -0.0681, -0.622995)),
-    (['right_leg', '--version', 'v2_5'], (0.0044175, 0.0681, -0.622995)),
-])
+@pytest.mark.parametrize(
+    ('words', 'position'),
+    [
+        (['left_leg=v1'], (0, -0.0681, -0.5975)),
+        (['right_leg', '--version', 'v1'], (0, 0.0681, -0.5975)),
+        (['left_leg'], (0.0044175, -0.0681, -0.622995)),
+        (['right_leg', '--version', 'v2_5'], (0.0044175, 0.0681, -0.622995)),
+    ],
+)
 def test_the_golden_pose_at_zero(words, position):
     answer = pose(*words, '--degrees', *ZEROS)
     x, y, z = position
     assert answer['position'] == pytest.approx(position, abs=1e-12)
-    assert answer['quaternion'] == pytest.approx((0, -math.sqrt(0.5), 0, math.sqrt(0.5)))
+    assert answer['quaternion'] == pytest.approx(
+        (0, -math.sqrt(0.5), 0, math.sqrt(0.5))
+    )
     expected = [[0, 0, -1, x], [0, 1, 0, y], [1, 0, 0, z], [0, 0, 0, 1]]
     assert np.allclose(answer['matrix'], expected, atol=1e-12)
 
 
 def test_json_has_exactly_the_documented_keys():
     answer = pose('left_leg', '--degrees', *ZEROS)
-    assert list(answer) == ['chain', 'version', 'root_frame', 'frame_id', 'position',
-                            'quaternion', 'matrix']
+    assert list(answer) == [
+        'chain',
+        'version',
+        'root_frame',
+        'frame_id',
+        'position',
+        'quaternion',
+        'matrix',
+    ]
     named = [answer[key] for key in ('chain', 'version', 'root_frame', 'frame_id')]
     assert named == ['left_leg', 'v2_5', 'root_link', 'l_foot_dh_frame']
 
@@ -62,7 +74,9 @@ def test_the_quaternion_is_the_matrix_and_the_position_its_last_column():
 def test_degrees_and_radians_mean_the_same():
     degrees = [10, -20, 30, -40, 50, -60]
     radians = map(math.radians, degrees)
-    assert pose('left_leg', '--degrees', *degrees) == pose('left_leg', '--radians', *radians)
+    assert pose('left_leg', '--degrees', *degrees) == pose(
+        'left_leg', '--radians', *radians
+    )
 
 
 def test_every_way_to_write_a_negative_number_is_read():
@@ -82,7 +96,9 @@ def test_a_slide_is_metres_beside_degrees_and_radians():
     # Spong, Hutchinson, Vidyasagar, example 3.2: (-s_1 d_3, c_1 d_3, d_1 + d_2).
     expected = (-0.5 * 0.25, math.sqrt(0.75) * 0.25, 0.6)
     assert pose(*ARM, '--degrees', 30, 0.2, 0.1)['position'] == pytest.approx(expected)
-    assert pose(*ARM, '--radians', math.pi / 6, 0.2, 0.1)['position'] == pytest.approx(expected)
+    assert pose(*ARM, '--radians', math.pi / 6, 0.2, 0.1)['position'] == pytest.approx(
+        expected
+    )
     text = run_main('pose', *ARM, '--degrees', 30, 0.2, 0.1).stdout
     assert 'lift     0.2  m    range 0 .. 0.5 m' in text
 
@@ -105,7 +121,11 @@ def test_the_text_shows_matrix_position_and_quaternion():
     words = ['left_leg', '--degrees', 10, 5, 0, -30, 15, 5]
     text = run_main('pose', *words).stdout
     answer = pose(*words)
-    rows = [line.strip(' []').split() for line in text.splitlines() if line.startswith('  [')]
+    rows = [
+        line.strip(' []').split()
+        for line in text.splitlines()
+        if line.startswith('  [')
+    ]
     assert np.abs(np.array(rows, dtype=float) - answer['matrix']).max() <= 0.5e-7
     for value in (*answer['position'], *answer['quaternion']):
         assert f'{value:.7f}' in text
@@ -130,4 +150,5 @@ def test_an_erratum_of_the_printed_range_is_noted_where_that_range_counts():
 
 def test_metres_that_may_be_millimetres_are_noted():
     assert 'lift = 200 m: positions of prismatic joints are in metres' in notes(
-        *ARM, '--degrees', 0, 200, 0.1)
+        *ARM, '--degrees', 0, 200, 0.1
+    )

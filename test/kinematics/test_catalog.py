@@ -16,20 +16,29 @@ import yaml
 ROOT = Path(__file__).resolve().parents[2]
 SPEC = ROOT.parent / 'shared' / 'spec'
 CATALOG = Catalog.load()
-PRINTED = yaml.safe_load((ROOT / 'config' / 'icub_kinematics.yaml').read_text(encoding='utf-8'))
-LEGS = {('left_leg', 'v1'): 'Left-V1', ('left_leg', 'v2_5'): 'Left-V2_5',
-        ('right_leg', 'v1'): 'Right-V1', ('right_leg', 'v2_5'): 'Right-V2_5'}
+PRINTED = yaml.safe_load(
+    (ROOT / 'config' / 'icub_kinematics.yaml').read_text(encoding='utf-8')
+)
+LEGS = {
+    ('left_leg', 'v1'): 'Left-V1',
+    ('left_leg', 'v2_5'): 'Left-V2_5',
+    ('right_leg', 'v1'): 'Right-V1',
+    ('right_leg', 'v2_5'): 'Right-V2_5',
+}
 
 needs_spec = pytest.mark.skipif(
-    not SPEC.is_dir(), reason='the documents are not in ../shared/spec beside this checkout')
+    not SPEC.is_dir(),
+    reason='the documents are not in ../shared/spec beside this checkout',
+)
 
 
 def section(document: str, heading: str) -> str:
     """Return the text from a heading to the next one, with its table rules taken out."""
     text = re.sub(r'[|]', ' ', document.replace('&gt;', '>').replace('\\_', '_'))
     text = re.split(rf'^[# ]*{heading}\s*$', text, flags=re.MULTILINE)[1]
-    return re.split(r'^[# ]*(?:Left|Right|Izquierda|Derecha)-V\S+\s*$', text,
-                    flags=re.MULTILINE)[0]
+    return re.split(
+        r'^[# ]*(?:Left|Right|Izquierda|Derecha)-V\S+\s*$', text, flags=re.MULTILINE
+    )[0]
 
 
 def printed_rows(text: str) -> list[dict[str, Any]]:
@@ -38,12 +47,17 @@ def printed_rows(text: str) -> list[dict[str, Any]]:
     rows = []
     for line in re.findall(r'^\s*i = \d.*$', text, flags=re.MULTILINE):
         index, a, d, alpha, theta = re.fullmatch(
-            r'\s*i = (\d)\s+(\S+)\s+(\S+)\s+(\S+)\s+(.+?)\s*', line).groups()
+            r'\s*i = (\d)\s+(\S+)\s+(\S+)\s+(\S+)\s+(.+?)\s*', line
+        ).groups()
         assert int(index) == len(rows) or (int(index) == 6 and not rows)
         offset = re.match(r'(-?\d+) \+', theta)
         limits = re.search(r'([-+]?\d+) *- *> *([-+]?\d+)', theta)
-        row = {'a': float(a), 'd': float(d), 'alpha': degrees[alpha],
-               'offset': float(offset[1]) if offset else 0.0}
+        row = {
+            'a': float(a),
+            'd': float(d),
+            'alpha': degrees[alpha],
+            'offset': float(offset[1]) if offset else 0.0,
+        }
         if limits:
             row['range'] = [float(limits[1]), float(limits[2])]
         rows.append(row)
@@ -53,15 +67,20 @@ def printed_rows(text: str) -> list[dict[str, Any]]:
 def printed_matrix(text: str, name: str) -> list[list[float]]:
     """Return the first matrix after its name."""
     number = r'\s*(-?[\d.]+)'
-    found = re.search(rf'{name}:[\s:-]*?' + rf'(?:{number}{number}{number}{number}\s*\n\s*)' * 4,
-                      text.replace('\\', '') + '\n')
+    found = re.search(
+        rf'{name}:[\s:-]*?' + rf'(?:{number}{number}{number}{number}\s*\n\s*)' * 4,
+        text.replace('\\', '') + '\n',
+    )
     values = list(map(float, found.groups()))
-    return [values[i:i + 4] for i in range(0, 16, 4)]
+    return [values[i : i + 4] for i in range(0, 16, 4)]
 
 
 def documented_fields(row: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in row.items()
-            if key not in ('erratum', 'robot_range')}
+    return {
+        key: value
+        for key, value in row.items()
+        if key not in ('erratum', 'robot_range')
+    }
 
 
 @needs_spec
@@ -89,16 +108,27 @@ def test_head_table_is_as_printed() -> None:
     assert printed_rows(virtual) == [{'a': 0, 'd': 6.6, 'alpha': 90, 'offset': 0}]
 
 
-@pytest.mark.parametrize(('name', 'version'), [
-    (name, version) for name, entry in CATALOG.chains.items() for version in entry.versions])
-def test_loaded_tables_are_the_printed_ones_in_metres_and_radians(name: str, version: str) -> None:
+@pytest.mark.parametrize(
+    ('name', 'version'),
+    [
+        (name, version)
+        for name, entry in CATALOG.chains.items()
+        for version in entry.versions
+    ],
+)
+def test_loaded_tables_are_the_printed_ones_in_metres_and_radians(
+    name: str, version: str
+) -> None:
     printed = PRINTED['chains'][name]
     table = printed['versions'][version]
     chain = CATALOG.chain(name, version)
-    assert chain.joint_names == tuple(printed['joints'])
+    assert chain.joint_names == tuple(table.get('joints', printed['joints']))
     for link, row in zip(chain.links, table['links'], strict=True):
         assert (link.a, link.d) == (row['a'] / 1000, row['d'] / 1000)
-        assert (link.alpha, link.offset) == (radians(row['alpha']), radians(row['offset']))
+        assert (link.alpha, link.offset) == (
+            radians(row['alpha']),
+            radians(row['offset']),
+        )
         assert (link.lower, link.upper) == tuple(map(radians, row['range']))
         assert link.erratum == row.get('erratum', '')
         assert link.joint_type == 'revolute'
@@ -110,58 +140,114 @@ def test_loaded_tables_are_the_printed_ones_in_metres_and_radians(name: str, ver
 def test_errata_stand_beside_the_printed_ranges_of_the_documented_legs() -> None:
     for name, version in LEGS:
         errata = [link.erratum for link in CATALOG.chain(name, version).links]
-        assert [bool(erratum) for erratum in errata] == [False, True, False, False, True, False]
+        assert [bool(erratum) for erratum in errata] == [
+            False,
+            True,
+            False,
+            False,
+            True,
+            False,
+        ]
         assert 'sign' in errata[1] and 'narrower' in errata[4]
 
 
 def test_version_3_names_its_source_which_is_not_the_documents() -> None:
     for entry in CATALOG.chains.values():
         for version, chain in entry.versions.items():
-            assert ('iKin' in chain.source) == (version == 'v3')
+            assert ('iCubGenova09' in chain.source) == (version == 'v3')
 
 
-@pytest.mark.parametrize(('arguments', 'message'), [
-    (('left_arm', 'v2_5'),
-     "unknown chain 'left_arm'; known: left_leg, right_leg, head_imu"),
-    (('left_leg', 'v2.5'),
-     "unknown version of chain left_leg 'v2.5'; did you mean 'v2_5'? known: v1, v2_5, v3"),
-    (('head_imu', 'v2', 'sole'),
-     "unknown tip frame of chain head_imu 'sole'; known: dh"),
-    (('left_leg', 'v2_5', 'toe'),
-     "unknown tip frame of chain left_leg 'toe'; known: dh, sole"),
-])
-def test_an_unknown_name_lists_the_known_ones(arguments: tuple[str, ...], message: str) -> None:
+@pytest.mark.parametrize(
+    ('arguments', 'message'),
+    [
+        (
+            ('left_arm', 'v2_5'),
+            "unknown chain 'left_arm'; known: left_leg, right_leg, head_imu",
+        ),
+        (
+            ('left_foot',),
+            "unknown chain 'left_foot'; known: left_leg, right_leg, head_imu; "
+            'left_foot is the tip of left_leg',
+        ),
+        (
+            ('r_sole',),
+            "unknown chain 'r_sole'; known: left_leg, right_leg, head_imu; "
+            'r_sole is the sole frame of right_leg',
+        ),
+        (
+            ('left_leg', 'v2.5'),
+            "unknown version 'v2.5' of chain left_leg; did you mean 'v2_5'? known: v1, v2_5, v3",
+        ),
+        (
+            ('head_imu', 'v2', 'sole'),
+            "unknown tip frame 'sole' of chain head_imu; known: dh",
+        ),
+        (
+            ('left_leg', 'v2_5', 'toe'),
+            "unknown tip frame 'toe' of chain left_leg; known: dh, sole",
+        ),
+    ],
+)
+def test_an_unknown_name_lists_the_known_ones(
+    arguments: tuple[str, ...], message: str
+) -> None:
     with pytest.raises(UnknownNameError) as error:
         CATALOG.chain(*arguments)
     assert str(error.value) == message
 
 
 def test_a_version_that_one_chain_lacks_is_answered_with_the_way_to_name_it() -> None:
-    with pytest.raises(UnknownNameError, match=r"chain head_imu 'v1'; .*known: v2; .*head_imu=v2"):
+    message = r"'v1' of chain head_imu; .*known: v2, v3; .*head_imu=v2"
+    with pytest.raises(UnknownNameError, match=message):
         CATALOG.select(['left_leg', 'head_imu'], 'v1')
     chosen = CATALOG.select(['left_leg', 'head_imu=v2'], 'v1')
     assert [(chain.name, chain.version) for chain in chosen] == [
-        ('left_leg', 'v1'), ('head_imu', 'v2')]
+        ('left_leg', 'v1'),
+        ('head_imu', 'v2'),
+    ]
 
 
 def test_the_files_default_versions_count_where_none_is_given() -> None:
     versions = {name: CATALOG.chain(name).version for name in CATALOG.chains}
     assert versions == {'left_leg': 'v2_5', 'right_leg': 'v2_5', 'head_imu': 'v2'}
     assert load_chain('left_leg').version == 'v2_5'
-    assert load_chain('left_leg=v1').version == load_chain('left_leg', 'v1').version == 'v1'
-    assert [chain.version for chain in CATALOG.select(CATALOG.chains)] == ['v2_5', 'v2_5', 'v2']
+    assert (
+        load_chain('left_leg=v1').version
+        == load_chain('left_leg', 'v1').version
+        == 'v1'
+    )
+    assert [chain.version for chain in CATALOG.select(CATALOG.chains)] == [
+        'v2_5',
+        'v2_5',
+        'v2',
+    ]
 
 
-@pytest.mark.parametrize(('names', 'words'), [
-    (['left_leg', 'left_leg=v1'], 'chain left_leg is named twice'),
-    ([], 'no chain is named; allowed: one or more of left_leg, right_leg, head_imu'),
-    (['left_leg=v3', 'right_leg'], 'left_leg=v3 and right_leg=v2_5 do not go together: x, y, z of '
-                                   'root_link point forward, left, up in the one and backward, '
-                                   'right, up in the other'),
-    (['left_leg=v9'], "unknown version of chain left_leg 'v9'; known: v1, v2_5, v3"),
-    (['left_leg='], "unknown chain 'left_leg='; did you mean 'left_leg'?"),
-])
-def test_chains_that_cannot_be_used_together_are_refused(names: list[str], words: str) -> None:
+@pytest.mark.parametrize(
+    ('names', 'words'),
+    [
+        (['left_leg', 'left_leg=v1'], 'chain left_leg is named twice'),
+        (
+            [],
+            'no chain is named; allowed: one or more of left_leg, right_leg, head_imu',
+        ),
+        (
+            ['left_leg=v3', 'right_leg'],
+            'left_leg=v3 and right_leg=v2_5 do not go together: x, y, z of '
+            'root_link point forward, left, up in the one and backward, '
+            'right, up in the other',
+        ),
+        (
+            ['left_leg=v9'],
+            "unknown version 'v9' of chain left_leg; known: v1, v2_5, v3",
+        ),
+        ('left_leg', "chains are 'left_leg'; allowed: a list of names"),
+        (['left_leg='], "unknown chain 'left_leg='; did you mean 'left_leg'?"),
+    ],
+)
+def test_chains_that_cannot_be_used_together_are_refused(
+    names: Any, words: str
+) -> None:
     with pytest.raises(LegFKError) as error:
         CATALOG.select(names)
     assert words in str(error.value)
@@ -198,23 +284,37 @@ def test_any_robot_can_be_read_in_metres_and_radians(tmp_path: Path) -> None:
     file.write_text(OWN)
     chain = Catalog.load(file).chain('crane', 'small')
     assert [(link.a, link.d, link.alpha, link.offset) for link in chain.links] == [
-        (0, 10, pi / 2, pi / 2), (0.5, -2, 0, 0), (0, 0.25, 0, 0)]
+        (0, 10, pi / 2, pi / 2),
+        (0.5, -2, 0, 0),
+        (0, 0.25, 0, 0),
+    ]
     assert [(link.joint_type, link.lower, link.upper) for link in chain.joints] == [
-        ('revolute', -float('inf'), float('inf')), ('prismatic', -3, 4)]
+        ('revolute', -float('inf'), float('inf')),
+        ('prismatic', -3, 4),
+    ]
     assert chain.out_of_range([9.0, 4.1]) == ('trolley',)
     # x = d of the trolley and the fixed row, y = a, z = mast and d of the slew.
     assert chain.forward([0, 3])[:3, 3] == pytest.approx((1.25, 0.5, 12.5), abs=1e-15)
 
 
 def test_shipped_file_is_found_beside_the_sources() -> None:
-    assert config_file('icub_kinematics.yaml') == ROOT / 'config' / 'icub_kinematics.yaml'
+    assert (
+        config_file('icub_kinematics.yaml') == ROOT / 'config' / 'icub_kinematics.yaml'
+    )
     assert Catalog.load().file == str(ROOT / 'config' / 'icub_kinematics.yaml')
 
 
-@pytest.mark.parametrize('below_prefix', [
-    'lib/python3.12/site-packages', 'local/lib/python3.12/dist-packages', 'site-packages'])
+@pytest.mark.parametrize(
+    'below_prefix',
+    [
+        'lib/python3.12/site-packages',
+        'local/lib/python3.12/dist-packages',
+        'site-packages',
+    ],
+)
 def test_shipped_file_is_found_in_the_prefix_of_an_installation(
-        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, below_prefix: str) -> None:
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, below_prefix: str
+) -> None:
     share = tmp_path / 'share' / 'icub_leg_fk' / 'config'
     share.mkdir(parents=True)
     (share / 'icub_kinematics.yaml').write_text('x')
@@ -224,7 +324,9 @@ def test_shipped_file_is_found_in_the_prefix_of_an_installation(
 
 
 def test_a_missing_shipped_file_lists_the_places_looked_at() -> None:
-    with pytest.raises(CatalogError, match=r'^nothing\.yaml: .*allowed: one of .*config, '):
+    with pytest.raises(
+        CatalogError, match=r'^nothing\.yaml: .*allowed: one of .*config, '
+    ):
         config_file('nothing.yaml')
 
 
@@ -232,6 +334,11 @@ def test_loading_needs_only_the_file(tmp_path: Path) -> None:
     """No ROS, no current directory, no environment."""
     code = 'from icub_leg_fk.kinematics import Catalog; print(*Catalog.load().chains)'
     result = subprocess.run(
-        [sys.executable, '-c', code], cwd=tmp_path, env={'PYTHONPATH': str(ROOT)}, check=True,
-        capture_output=True, text=True)
+        [sys.executable, '-c', code],
+        cwd=tmp_path,
+        env={'PYTHONPATH': str(ROOT)},
+        check=True,
+        capture_output=True,
+        text=True,
+    )
     assert result.stdout.split() == ['left_leg', 'right_leg', 'head_imu']

@@ -86,12 +86,14 @@ def test_the_models_of_roboticstoolbox_are_computed_exactly(tmp_path: Path) -> N
         file.write_text(as_yaml(model))
         chain = Catalog.load(file).chain('robot')
         allowed = TOLERANCE * largest_length(model)
-        for q in rng.uniform(-3, 3, (20, chain.n)):
+        for q in rng.uniform(-3, 3, (6, chain.n)):
             frames = np.array([T.A for T in model.fkine_all(q)])
             expected = model.fkine(q).A
             assert np.abs(chain.frames(q)[:-1] - frames).max() < allowed, name
             assert np.abs(chain.forward(q) - expected).max() < allowed, name
-            assert np.abs(np.array(chain.pose(q)[:3]) - expected[:3, 3]).max() < allowed, name
+            assert (
+                np.abs(np.array(chain.pose(q)[:3]) - expected[:3, 3]).max() < allowed
+            ), name
 
 
 def test_the_makers_panda_is_roboticstoolboxs() -> None:
@@ -108,11 +110,15 @@ def test_a_modified_chain_gives_its_rows_and_frames_as_craig_does() -> None:
     rows = [row.link for row in panda.rows()]
     assert [row.a for row in rows] == [0, 0, 0, 0.0825, -0.0825, 0, 0.088, 0]
     assert np.degrees([row.alpha for row in rows]) == pytest.approx(
-        [0, -90, 90, 90, -90, 90, 90, 0])
+        [0, -90, 90, 90, -90, 90, 90, 0]
+    )
     assert 'modified' in str(panda).splitlines()[0]
     assert str(panda).splitlines()[5].split()[:4] == ['3', 'panda_joint4', '82.5', '0']
     # Craig's frame i turns with joint i, about its own z axis.
-    still, moved = panda.frames([0.0] * 7), panda.frames([0.0, 0.0, 0.0, 0.7, 0.0, 0.0, 0.0])
+    still, moved = (
+        panda.frames([0.0] * 7),
+        panda.frames([0.0, 0.0, 0.0, 0.7, 0.0, 0.0, 0.0]),
+    )
     assert np.array_equal(still[:4], moved[:4])
     assert np.array_equal(still[4, :3, 2:], moved[4, :3, 2:])
     assert np.abs(still[5:, :3, 3] - moved[5:, :3, 3]).max() > 0.05
@@ -122,9 +128,19 @@ FIXED, PLAIN = DHLink(0, 0, 0, joint_type='fixed'), DHLink(0, 0.2, 0, 0.3)
 TURN, SHIFTED = DHLink(0.1, 0, 0.7, -0.2), DHLink(0.3, 0, -0.4, joint_type='fixed')
 
 
-@pytest.mark.parametrize('rows', [
-    (PLAIN,), (TURN,), (FIXED, TURN), (SHIFTED, PLAIN), (FIXED, FIXED, PLAIN), (TURN, SHIFTED),
-    (SHIFTED, TURN, PLAIN), (PLAIN, FIXED)])
+@pytest.mark.parametrize(
+    'rows',
+    [
+        (PLAIN,),
+        (TURN,),
+        (FIXED, TURN),
+        (SHIFTED, PLAIN),
+        (FIXED, FIXED, PLAIN),
+        (TURN, SHIFTED),
+        (SHIFTED, TURN, PLAIN),
+        (PLAIN, FIXED),
+    ],
+)
 def test_modified_rows_come_back_from_standard_ones(rows: tuple[DHLink, ...]) -> None:
     assert modified_rows(standard_rows(rows)) == rows
     chain = replace(chain_of(standard_rows(rows)), convention='modified')
@@ -179,23 +195,43 @@ def test_fractions_of_pi_are_exact_and_a_gain_turns_a_joint_around(arm: Path) ->
     assert [link.offset for link in chain.links] == [-np.pi / 2, 3 * np.pi / 4]
     forward = Catalog.load(arm)
     assert forward.chain('arm', 'v1').forward([0.3, 0.1])[:3, 3] == pytest.approx(
-        [0.5 * np.cos(-np.pi / 2 - 0.3) + 0.1 * np.sin(-np.pi / 2 - 0.3),
-         0.5 * np.sin(-np.pi / 2 - 0.3) - 0.1 * np.cos(-np.pi / 2 - 0.3), 0], abs=1e-15)
+        [
+            0.5 * np.cos(-np.pi / 2 - 0.3) + 0.1 * np.sin(-np.pi / 2 - 0.3),
+            0.5 * np.sin(-np.pi / 2 - 0.3) - 0.1 * np.cos(-np.pi / 2 - 0.3),
+            0,
+        ],
+        abs=1e-15,
+    )
 
 
 def test_a_version_says_otherwise_what_its_chain_says(arm: Path) -> None:
     one, two = (Catalog.load(arm).chain('arm', version) for version in ('v1', 'v2'))
-    assert (one.root_frame, one.joint_names, one.frame_id) == ('base', ('turn', 'slide'), 'tool')
+    assert (one.root_frame, one.joint_names, one.frame_id) == (
+        'base',
+        ('turn', 'slide'),
+        'tool',
+    )
     assert (two.root_frame, two.joint_names, two.frame_id) == (
-        'other_base', ('swing', 'push'), 'claw')
+        'other_base',
+        ('swing', 'push'),
+        'claw',
+    )
     assert one.tip == two.tip == 'hand'
 
 
 def test_what_can_hardly_be_meant_is_computed_and_reported(arm: Path) -> None:
     rotation, length, angle = Catalog.load(arm).warnings
-    assert f'{arm}:8: chain arm, field tip_frames, pad, field transform: the rot' in rotation
-    assert f'{arm}:23: chain arm, version v2, row 1, field a: 250 m is unlikely' in length
-    assert f'{arm}:23: chain arm, version v2, row 1, field alpha: 90 rad is unlike' in angle
+    assert (
+        f'{arm}:8: chain arm, field tip_frames, pad, field transform: the rot'
+        in rotation
+    )
+    assert (
+        f'{arm}:23: chain arm, version v2, row 1, field a: 250 m is unlikely' in length
+    )
+    assert (
+        f'{arm}:23: chain arm, version v2, row 1, field alpha: 90 rad is unlike'
+        in angle
+    )
     R = Catalog.load(arm).chain('arm', 'v1', 'pad').forward([0, 0])[:3, :3]
     assert np.abs(R @ R.T - np.eye(3)).max() < 1e-15
     with pytest.warns(UserWarning) as warned:
@@ -204,14 +240,77 @@ def test_what_can_hardly_be_meant_is_computed_and_reported(arm: Path) -> None:
     assert {warning.filename for warning in warned} == {__file__}
 
 
+def test_radians_in_a_file_of_degrees_are_computed_and_reported(tmp_path: Path) -> None:
+    file = tmp_path / 'arm.yaml'
+    own = ARM.replace('angle: rad', 'angle: deg').replace('0.7071', '0.70710678118')
+    own = (
+        own.replace('alpha: pi/2, offset: -pi/2', 'alpha: 1.5708, offset: -3.142')
+        .replace('alpha: pi, offset: 3*pi/4', 'alpha: 45.5, offset: -0.78')
+        .replace('250', '0.25')
+    )
+    file.write_text(own)
+    alpha, offset = Catalog.load(file).warnings
+    assert (
+        'version v1, row 0, field alpha: 1.5708 deg is unlikely, since it is a fracti'
+        in alpha
+    )
+    assert 'version v1, row 0, field offset: -3.142 deg is unlikely' in offset
+    assert Catalog.load(file).chain('arm', 'v1').links[0].alpha == np.radians(1.5708)
+
+
+@pytest.mark.parametrize(
+    ('units', 'row', 'doubt'),
+    [
+        (
+            'mm, angle: deg',
+            'a: 0.3, d: 0, alpha: 90',
+            '0.3 mm for the longest length is unlikely',
+        ),
+        ('mm, angle: deg', 'a: 0, d: 0, alpha: 90', ''),
+        ('mm, angle: deg', 'a: 6, d: 0, alpha: 90', ''),
+        (
+            'm, angle: deg',
+            'a: 30, d: 0, alpha: 90',
+            '30 m is unlikely; the unit of length is m',
+        ),
+        (
+            'm, angle: rad',
+            'a: 1, d: 0, alpha: 1.57',
+            '1.57 rad is 0.0008 rad from pi/2, which',
+        ),
+        (
+            'm, angle: rad',
+            'a: 1, d: 0, alpha: -3.14',
+            '-3.14 rad is 0.002 rad from -pi, which',
+        ),
+        ('m, angle: rad', 'a: 1, d: 0, alpha: 1.5708', ''),
+        ('m, angle: rad', 'a: 1, d: 0, alpha: pi/2', ''),
+        ('m, angle: rad', 'a: 1, d: 0, alpha: 1.55', ''),
+        ('m, angle: deg', 'a: 1, d: 0, alpha: 3.14', '3.14 deg is unlikely'),
+    ],
+)
+def test_a_table_in_another_unit_is_doubted(
+    units: str, row: str, doubt: str, tmp_path: Path
+) -> None:
+    file = tmp_path / 'arm.yaml'
+    file.write_text(
+        f'units: {{length: {units}}}\nchains:\n  arm:\n    tip: tool\n'
+        '    root_frame: base\n    joints: [j]\n    tip_frames: {dh: {frame: t}}\n'
+        f'    versions: {{v1: {{links: [{{{row}}}]}}}}\n'
+    )
+    warnings = Catalog.load(file).warnings
+    assert len(warnings) == bool(doubt) and doubt in ''.join(warnings)
+
+
 def test_three_decimals_are_too_few_for_a_rotation(arm: Path) -> None:
     arm.write_text(ARM.replace('0.7071', '0.707'))
     with pytest.raises(CatalogError, match=r'not a rigid transform.*four decimals'):
         Catalog.load(arm)
 
 
-def test_two_catalogs_of_one_table_are_equal_whatever_their_path(arm: Path,
-                                                                 tmp_path: Path) -> None:
+def test_two_catalogs_of_one_table_are_equal_whatever_their_path(
+    arm: Path, tmp_path: Path
+) -> None:
     (tmp_path / 'copy.yaml').write_text(ARM.replace('d: 0.2', 'd: 0.20'))
     one, two = Catalog.load(arm), Catalog.load(tmp_path / 'copy.yaml')
     assert one == two and hash(one) == hash(two) and Catalog.load() == Catalog.load()

@@ -20,7 +20,9 @@ LEG = load_chain('left_leg')
 Z = np.array([0.0, 0.0, 1.0])
 
 
-def moved(axis: np.ndarray, degrees: float, by: tuple[float, ...] = (0, 0, 0)) -> np.ndarray:
+def moved(
+    axis: np.ndarray, degrees: float, by: tuple[float, ...] = (0, 0, 0)
+) -> np.ndarray:
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = turns_about(axis, np.radians(degrees)), by
     return T
@@ -44,8 +46,9 @@ def test_postures_are_the_same_at_every_call_and_fill_the_ranges() -> None:
 
 @pytest.mark.parametrize('axis', [*np.eye(3), np.array([0.6, 0.0, -0.8])], ids=str)
 @pytest.mark.parametrize('degrees', [0, 45, 90, 180])
-def test_constants_at_both_ends_are_found_however_the_root_is_turned(axis: np.ndarray,
-                                                                     degrees: float) -> None:
+def test_constants_at_both_ends_are_found_however_the_root_is_turned(
+    axis: np.ndarray, degrees: float
+) -> None:
     ours = LEG.forward(postures(LEG, 100, 1.2))
     theirs = moved(axis, degrees, (0.1, 0.2, 0.3)) @ ours @ moved(Z, 70, (0, -0.1, 0))
     X, Y = fit(ours, theirs)
@@ -55,17 +58,34 @@ def test_constants_at_both_ends_are_found_however_the_root_is_turned(axis: np.nd
 
 
 def test_what_constants_cannot_make_up_for_is_left() -> None:
-    links = (*LEG.links[:3], replace(LEG.links[3], a=LEG.links[3].a - 0.02), *LEG.links[4:])
+    links = (
+        *LEG.links[:3],
+        replace(LEG.links[3], a=LEG.links[3].a - 0.02),
+        *LEG.links[4:],
+    )
     positions = postures(LEG, 400, 1.2)
     ours, theirs = LEG.forward(positions), replace(LEG, links=links).forward(positions)
     X, Y = fit(ours, theirs)
-    assert 2 < distance(X @ ours @ Y, theirs).mm < distance(ours, theirs).mm == pytest.approx(20)
+    assert (
+        2
+        < distance(X @ ours @ Y, theirs).mm
+        < distance(ours, theirs).mm
+        == pytest.approx(20)
+    )
 
 
-@pytest.mark.parametrize(('axis', 'degrees', 'words'), [
-    (Z, 0, ''), (Z, 0.3, ''), (Z, 90, '90 deg about z'), (-Z, 90, '90 deg about - z'),
-    (-Z, 180, '180 deg about z'), (np.sqrt([0.2, 0, 0.8]), 45, '45 deg about 0.5 x + z'),
-    (np.sqrt([0.5, 0, 0.5]), 180, '180 deg about x + z')])
+@pytest.mark.parametrize(
+    ('axis', 'degrees', 'words'),
+    [
+        (Z, 0, ''),
+        (Z, 0.3, ''),
+        (Z, 90, '90 deg about z'),
+        (-Z, 90, '90 deg about - z'),
+        (-Z, 180, '180 deg about z'),
+        (np.sqrt([0.2, 0, 0.8]), 45, '45 deg about 0.5 x + z'),
+        (np.sqrt([0.5, 0, 0.5]), 180, '180 deg about x + z'),
+    ],
+)
 def test_turns_in_words(axis: np.ndarray, degrees: float, words: str) -> None:
     assert turn_in_words(turns_about(axis, np.radians(degrees))) == words
 

@@ -65,27 +65,34 @@ def test_rows_follow_the_joints_that_they_name(finger: Catalog) -> None:
 def test_what_is_not_said_is_zero_and_the_identity(finger: Catalog) -> None:
     chain = finger.chain('finger')
     assert [link.offset for link in chain.links] == [0, 0, np.radians(5), 0]
-    assert np.array_equal(chain.T_root_0, np.eye(4)) and np.array_equal(chain.T_n_tip, np.eye(4))
+    assert np.array_equal(chain.T_root_0, np.eye(4)) and np.array_equal(
+        chain.T_n_tip, np.eye(4)
+    )
     assert finger.chain('finger', 'large').T_root_0[0, 3] == 0.005
 
 
-def test_a_default_is_the_chains_own_the_files_or_the_only_version(finger: Catalog,
-                                                                   tmp_path: Path) -> None:
+def test_a_default_is_the_chains_own_the_files_or_the_only_version(
+    finger: Catalog, tmp_path: Path
+) -> None:
     assert finger.chain('finger').version == 'small'
     assert finger.chain('thumb').version == 'only'
     file = tmp_path / 'own.yaml'
-    file.write_text(FINGER.replace('  finger:', '  finger:\n    default_version: large'))
+    file.write_text(
+        FINGER.replace('  finger:', '  finger:\n    default_version: large')
+    )
     assert load_chain('finger', file=file).version == 'large'
     file.write_text(FINGER.replace('default_version: small', ''))
     with pytest.raises(VersionNeededError) as error:
         load_chain('finger', file=file)
     assert str(error.value) == (
-        'chain finger has several versions and no default; give one of small, large')
+        'chain finger has several versions and no default; give one of small, large'
+    )
     assert (error.value.chain, error.value.versions) == ('finger', ('small', 'large'))
 
 
 def test_root_axes_are_a_versions_or_its_chains_and_conflict_with_none_given(
-        finger: Catalog) -> None:
+    finger: Catalog,
+) -> None:
     assert finger.chain('finger').root_axes == ('left', 'up', 'forward')
     assert finger.chain('finger=large').root_axes == ('forward', 'left', 'up')
     assert len(finger.select(['finger=large', 'thumb'])) == 2
@@ -93,8 +100,10 @@ def test_root_axes_are_a_versions_or_its_chains_and_conflict_with_none_given(
 
 def test_outlines_are_shared_by_an_alias(finger: Catalog) -> None:
     for name in ('finger', 'thumb'):
-        frame, = finger.chain(name).tip_frames.values()
-        assert frame.outline == pytest.approx(np.array([[-0.01, 0], [0.01, 0], [0, 0.005]]))
+        (frame,) = finger.chain(name).tip_frames.values()
+        assert frame.outline == pytest.approx(
+            np.array([[-0.01, 0], [0.01, 0], [0, 0.005]])
+        )
 
 
 def test_names_are_any_text(finger: Catalog, tmp_path: Path) -> None:
@@ -122,5 +131,6 @@ chains:
       v1: {links: [{a: 0.1, d: 0, alpha: 90}, {a: 0.2, d: 0, alpha: 0}]}
 """)
     chain = load_chain('arm', 'v1', file=file)
-    assert chain.pose({'Revolute 2': np.pi / 2, 'robot::arm::j1': 0.0})[:3] == pytest.approx(
-        (0.1, 0, 0.2))
+    assert chain.pose({'Revolute 2': np.pi / 2, 'robot::arm::j1': 0.0})[
+        :3
+    ] == pytest.approx((0.1, 0, 0.2))

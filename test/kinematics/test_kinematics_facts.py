@@ -2,28 +2,35 @@
 
 from dataclasses import replace
 
+from icub_leg_fk.errors import LegFKError
 from icub_leg_fk.kinematics import Catalog, DHLink
 import numpy as np
 import pytest
+from support.described_robots import needs_real_robots, pinocchio_pose, REAL
 
 CATALOG = Catalog.load()
-MIRROR = np.diag([1.0, -1.0, 1.0])  # left and right, in the root frame
+MIRROR = np.diag([1.0, -1.0, 1.0, 1.0])  # left and right, in the root frame
 
 
-@pytest.mark.parametrize(('name', 'version', 'position_mm'), [
-    ('left_leg', 'v1', (0, -68.1, -597.5)),
-    ('right_leg', 'v1', (0, 68.1, -597.5)),
-    ('left_leg', 'v2_5', (4.4175, -68.1, -622.995)),
-    ('right_leg', 'v2_5', (4.4175, 68.1, -622.995)),
-])
+@pytest.mark.parametrize(
+    ('name', 'version', 'position_mm'),
+    [
+        ('left_leg', 'v1', (0, -68.1, -597.5)),
+        ('right_leg', 'v1', (0, 68.1, -597.5)),
+        ('left_leg', 'v2_5', (4.4175, -68.1, -622.995)),
+        ('right_leg', 'v2_5', (4.4175, 68.1, -622.995)),
+    ],
+)
 def test_foot_at_zero_is_where_it_is_known_to_be(
-        name: str, version: str, position_mm: tuple[float, float, float]) -> None:
+    name: str, version: str, position_mm: tuple[float, float, float]
+) -> None:
     chain = CATALOG.chain(name, version)
     T = chain.forward([0] * 6)
     assert T[:3, 3] * 1000 == pytest.approx(position_mm, abs=1e-10)
     assert np.array_equal(T[:3, :3], [[0, 0, -1], [0, 1, 0], [1, 0, 0]])
     assert chain.pose([0.0] * 6) == pytest.approx(
-        (*np.array(position_mm) / 1000, 0, -np.sqrt(0.5), 0, np.sqrt(0.5)), abs=1e-13)
+        (*np.array(position_mm) / 1000, 0, -np.sqrt(0.5), 0, np.sqrt(0.5)), abs=1e-13
+    )
 
 
 def test_head_sensor_at_zero_is_where_it_is_known_to_be() -> None:
@@ -32,13 +39,35 @@ def test_head_sensor_at_zero_is_where_it_is_known_to_be() -> None:
     assert np.array_equal(T[:3, :3], np.eye(3))
 
 
+def test_version_3_serves_the_whole_robot() -> None:
+    names = ['left_leg', 'right_leg', 'head_imu']
+    chains = CATALOG.select(names, 'v3')
+    assert [(chain.root_frame, chain.root_axes) for chain in chains] == [
+        ('root_link', ('forward', 'left', 'up'))
+    ] * 3
+    with pytest.raises(LegFKError, match='head_imu=v2 do not go together'):
+        CATALOG.select([*names[:2], 'head_imu=v2'], 'v3')
+
+
+@needs_real_robots
+def test_the_head_of_version_3_is_that_of_its_robot() -> None:
+    text = REAL['iCubGenova09'].read_text()
+    head = CATALOG.chain('head_imu', 'v3')
+    for q in np.random.default_rng(8).uniform(-1.5, 1.5, (100, 6)):
+        positions = dict(zip(head.joint_names, q, strict=True))
+        expected = pinocchio_pose(text, 'root_link', 'imu_frame', positions)
+        assert head.forward(q) == pytest.approx(expected, abs=1e-12)
+
+
 @pytest.mark.parametrize('version', ['v1', 'v2_5', 'v3'])
 def test_right_foot_mirrors_left_foot(version: str) -> None:
-    left, right = CATALOG.chain('left_leg', version), CATALOG.chain('right_leg', version)
-    for q in np.random.default_rng(3).uniform(-3, 3, (1000, 6)):
-        T_left, T_right = left.forward(q), right.forward(q)
-        assert T_right[:3, 3] == pytest.approx(MIRROR @ T_left[:3, 3], abs=1e-14)
-        assert T_right[:3, :3] == pytest.approx(MIRROR @ T_left[:3, :3] @ MIRROR, abs=1e-14)
+    left, right = (
+        CATALOG.chain('left_leg', version),
+        CATALOG.chain('right_leg', version),
+    )
+    Q = np.random.default_rng(3).uniform(-3, 3, (1000, 6))
+    mirrored = MIRROR @ left.forward(Q) @ MIRROR
+    assert np.abs(right.forward(Q) - mirrored).max() < 1e-14
 
 
 @pytest.mark.parametrize('name', ['left_leg', 'right_leg'])
@@ -47,7 +76,9 @@ def test_sole_points_forward_left_and_up_when_standing(name: str) -> None:
         T = CATALOG.chain(name, version, 'sole').forward([0] * 6)
         # The root frame's x points backward and its y to the robot's right, but on the iCub 3.
         forward = 1 if version == 'v3' else -1
-        assert np.array_equal(T[:3, :3].T, [[forward, 0, 0], [0, forward, 0], [0, 0, 1]])
+        assert np.array_equal(
+            T[:3, :3].T, [[forward, 0, 0], [0, forward, 0], [0, 0, 1]]
+        )
 
 
 def test_sensor_transform_equals_the_fixed_row() -> None:
@@ -76,4 +107,7 @@ def test_out_of_range_names_the_joints_and_clamps_nothing() -> None:
     assert chain.out_of_range(within) == ()
     assert chain.out_of_range(outside) == ('l_hip_roll', 'l_knee')
     clamped = [0.0, np.radians(-20), 0.0, np.radians(4), 0.0, 0.0]
-    assert np.linalg.norm(chain.forward(outside)[:3, 3] - chain.forward(clamped)[:3, 3]) > 0.08
+    assert (
+        np.linalg.norm(chain.forward(outside)[:3, 3] - chain.forward(clamped)[:3, 3])
+        > 0.08
+    )

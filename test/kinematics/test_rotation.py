@@ -5,14 +5,19 @@ import math
 from hypothesis import example, given
 from hypothesis import strategies as st
 from icub_leg_fk.kinematics import matrix_to_quaternion
-from icub_leg_fk.kinematics.rotation import cos_sin, is_rigid_transform, nearest_rotation
+from icub_leg_fk.kinematics.rotation import (
+    cos_sin,
+    is_rigid_transform,
+    nearest_rotation,
+)
 import numpy as np
 import pytest
 from support.oracle import quaternion_to_matrix
 
 EPS = np.finfo(float).eps
 COMPONENT = st.one_of(
-    st.floats(-1, 1), st.sampled_from([0.0, -0.0, 1.0, -1.0, 1e-9, -1e-9, 1e-200]))
+    st.floats(-1, 1), st.sampled_from([0.0, -0.0, 1.0, -1.0, 1e-9, -1e-9, 1e-200])
+)
 
 
 @st.composite
@@ -41,7 +46,9 @@ def check_unit_with_positive_w(q: np.ndarray) -> None:
 @example(np.array([0.6, 0.0, 0.8]), math.pi - 1e-9)
 @example(np.array([0.6, 0.0, -0.8]), math.pi + 1e-9)
 @example(np.array([0.0, 0.0, 1.0]), 0.0)
-def test_quaternion_is_the_axis_and_half_the_angle(axis: np.ndarray, angle: float) -> None:
+def test_quaternion_is_the_axis_and_half_the_angle(
+    axis: np.ndarray, angle: float
+) -> None:
     q = matrix_to_quaternion(rodrigues(axis, angle))
     expected = np.array([*(math.sin(angle / 2) * axis), math.cos(angle / 2)])
     assert min(np.abs(q - expected).max(), np.abs(q + expected).max()) < 1e-14
@@ -72,11 +79,18 @@ def test_other_angles_are_the_c_librarys(angle: float) -> None:
     assert s == pytest.approx(math.sin(angle), abs=3e-15)
 
 
-@pytest.mark.parametrize('T', [
-    np.diag([2.0, 1, 1, 1]), np.diag([-1.0, 1, 1, 1]), np.diag([1.0, 1, 1, 2]),
-    np.diag([1e200, 1, 1, 1]), np.full((4, 4), np.nan),
-    np.eye(4) + 1e-3 * np.eye(4, k=1), np.eye(3),
-])
+@pytest.mark.parametrize(
+    'T',
+    [
+        np.diag([2.0, 1, 1, 1]),
+        np.diag([-1.0, 1, 1, 1]),
+        np.diag([1.0, 1, 1, 2]),
+        np.diag([1e200, 1, 1, 1]),
+        np.full((4, 4), np.nan),
+        np.eye(4) + 1e-3 * np.eye(4, k=1),
+        np.eye(3),
+    ],
+)
 def test_what_is_no_rotation_is_no_rigid_transform(T: np.ndarray) -> None:
     assert not is_rigid_transform(T)
 

@@ -18,19 +18,25 @@ def read(line):
     return read_arguments(['program', *line.split()])
 
 
-@pytest.mark.parametrize(('line', 'meant'), [
-    ('version:=v1', '--ros-args -p version:=v1'),
-    ('version:=v1 --ros-args -p foot_frame:=sole', '--ros-args -p version:=v1'),
-    ('--ros-args -p foot_frame:=sole version:=v1', '--ros-args -p version:=v1'),
-    ('--ros-args -p foot_frame:=sole -- _version:=v1', '--ros-args -p version:=v1'),
-    ('verson:=v1', '--ros-args -p version:=v1'),
-    ('joint_states:=/x', '--ros-args -r joint_states:=/x'),
-    ('__node:=x', '--ros-args -r __node:=x'),
-    ('--ros-args -p version=v1', '-p version:=v1'),
-    ('--ros-args --param version', '-p version:=VALUE'),
-    ('--ros-args -r version:=v1', '-p version:=v1'),
-    ('--ros-args --remap foot_pose_publisher:chains:=[left_leg]', '-p chains:=[left_leg]'),
-])
+@pytest.mark.parametrize(
+    ('line', 'meant'),
+    [
+        ('version:=v1', '--ros-args -p version:=v1'),
+        ('version:=v1 --ros-args -p foot_frame:=sole', '--ros-args -p version:=v1'),
+        ('--ros-args -p foot_frame:=sole version:=v1', '--ros-args -p version:=v1'),
+        ('--ros-args -p foot_frame:=sole -- _version:=v1', '--ros-args -p version:=v1'),
+        ('verson:=v1', '--ros-args -p version:=v1'),
+        ('joint_states:=/x', '--ros-args -r joint_states:=/x'),
+        ('__node:=x', '--ros-args -r __node:=x'),
+        ('--ros-args -p version=v1', '-p version:=v1'),
+        ('--ros-args --param version', '-p version:=VALUE'),
+        ('--ros-args -r version:=v1', '-p version:=v1'),
+        (
+            '--ros-args --remap foot_pose_publisher:chains:=[left_leg]',
+            '-p chains:=[left_leg]',
+        ),
+    ],
+)
 def test_what_leads_nowhere_is_refused_with_the_way_to_write_it(line, meant):
     with pytest.raises(LegFKError) as error:
         check_assignments(read(line), NAMES)
@@ -38,25 +44,42 @@ def test_what_leads_nowhere_is_refused_with_the_way_to_write_it(line, meant):
 
 
 def test_what_is_written_well_passes():
-    check_assignments(read('--ros-args -p version:=v1 -p node:chains:=[a=v1] -r joint_states:=/x '
-                           '-r __ns:=/icub --log-level rcl:=debug --params-file a:=b -- file'),
-                      NAMES)
+    check_assignments(
+        read(
+            '--ros-args -p version:=v1 -p node:chains:=[a=v1] -r joint_states:=/x '
+            '-r __ns:=/icub --log-level rcl:=debug --params-file a:=b -- file'
+        ),
+        NAMES,
+    )
 
 
 def test_the_names_given_are_those_for_this_node():
-    arguments = read('a:=1 --ros-args -p b:=2 --param foot_pose_publisher:c:=3 -p /**:d:=4 '
-                     '-p /icub/foot_pose_publisher:e:=5 -p other:f:=6 -r g:=7 -- -p h:=8')
+    arguments = read(
+        'a:=1 --ros-args -p b:=2 --param foot_pose_publisher:c:=3 -p /**:d:=4 '
+        '-p /icub/foot_pose_publisher:e:=5 -p other:f:=6 -r g:=7 -- -p h:=8'
+    )
     assert names_given(arguments, NODE) == {'b', 'd', 'e'}
     assert names_given(arguments, '/foot_pose_publisher') == {'b', 'c', 'd'}
 
 
 # What rclpy does with each of these names, tried with rclpy 7.1.
-@pytest.mark.parametrize(('place', 'root', 'inside'), [
-    ('/**', True, True), ('**', True, True), ('/*', True, False), ('/*/*', False, True),
-    ('foot_pose_publisher', True, False), ('/foot_pose_publisher', True, False),
-    ('/**/foot_pose_publisher', True, True), ('/*/foot_pose_publisher', False, True),
-    ('icub/foot_pose_publisher', False, True), ('/icub/**', False, True),
-    ('/icub', False, False), ('/foot_pose_publisher/**', True, False)])
+@pytest.mark.parametrize(
+    ('place', 'root', 'inside'),
+    [
+        ('/**', True, True),
+        ('**', True, True),
+        ('/*', True, False),
+        ('/*/*', False, True),
+        ('foot_pose_publisher', True, False),
+        ('/foot_pose_publisher', True, False),
+        ('/**/foot_pose_publisher', True, True),
+        ('/*/foot_pose_publisher', False, True),
+        ('icub/foot_pose_publisher', False, True),
+        ('/icub/**', False, True),
+        ('/icub', False, False),
+        ('/foot_pose_publisher/**', True, False),
+    ],
+)
 def test_a_place_in_a_file_is_a_name_or_a_pattern(tmp_path, place, root, inside):
     file = tmp_path / 'parameters.yaml'
     file.write_text(f'"{place}": {{ros__parameters: {{version: v1}}}}\n')
@@ -68,8 +91,10 @@ def test_a_place_in_a_file_is_a_name_or_a_pattern(tmp_path, place, root, inside)
 
 def test_places_can_be_nested_and_the_last_value_counts(tmp_path):
     file = tmp_path / 'parameters.yaml'
-    file.write_text('/**: {ros__parameters: {version: v1, foot_frame: sole}}\n'
-                    'icub: {foot_pose_publisher: {ros__parameters: {version: v3}}}\n')
+    file.write_text(
+        '/**: {ros__parameters: {version: v1, foot_frame: sole}}\n'
+        'icub: {foot_pose_publisher: {ros__parameters: {version: v3}}}\n'
+    )
     assert parameters_for(str(file), NODE) == {'version': 'v3', 'foot_frame': 'sole'}
 
 
@@ -78,7 +103,8 @@ def test_a_file_for_others_is_reported_with_whom_it_is_for(tmp_path):
     file.write_text('/other/foot_pose_publisher: {ros__parameters: {version: v1}}\n')
     assert files_for_others(read(f'--ros-args --params-file {file}'), NODE) == [
         f'nothing was taken from {file}: it is for /other/foot_pose_publisher, and this node is '
-        f'{NODE}']
+        f'{NODE}'
+    ]
 
 
 @pytest.mark.parametrize('content', ['', '[', '\0', '[1, 2]', 'no: node'])

@@ -29,14 +29,19 @@ ANGLES = {name: 0.03 * (i + 1) * (-1) ** i for i, name in enumerate(BOTH)}
 BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 LATE = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 PARAMETERS = config_file('foot_pose_publisher.yaml')
+NODE = 'qos_overrides.{ns}/foot_pose_publisher'
 TWIST_QOS = {
-    'qos_overrides.{ns}/foot_pose_publisher/left_foot/twist.publisher.durability':
-        'transient_local',
-    'qos_overrides.{ns}/foot_pose_publisher/right_foot/twist.publisher.reliability':
-        'best_effort',
+    NODE + '/left_foot/twist.publisher.durability': 'transient_local',
+    NODE + '/right_foot/twist.publisher.reliability': 'best_effort',
 }
-RENAMED = ['-r', '__node:=feet', '-r', 'joint_states:=/yarp/state/joints',
-           '-r', '~/left_foot/pose:=/where/left']
+RENAMED = [
+    '-r',
+    '__node:=feet',
+    '-r',
+    'joint_states:=/yarp/state/joints',
+    '-r',
+    '~/left_foot/pose:=/where/left',
+]
 RENAMED_QOS = {
     'qos_overrides./yarp/state/joints.subscription.reliability': 'reliable',
     'qos_overrides./yarp/state/joints.subscription.depth': 5000,
@@ -47,8 +52,10 @@ RENAMED_QOS = {
 def shared():
     """Return a node that loses nothing, with the shipped parameter file, and a robot beside it."""
     parameters = {**LOSSLESS, **TWIST_QOS}
-    with NodeProcess(parameters, ['--params-file', str(PARAMETERS)]) as node, \
-            Robot(node) as robot:
+    with (
+        NodeProcess(parameters, ['--params-file', str(PARAMETERS)]) as node,
+        Robot(node) as robot,
+    ):
         robot.connect()
         yield node, robot
 
@@ -101,8 +108,11 @@ def endpoint(robot, kind, topic):
     found = []
 
     def is_there():
-        found[:] = [info for info in lister(topic) if info.node_name == 'foot_pose_publisher']
+        found[:] = [
+            info for info in lister(topic) if info.node_name == 'foot_pose_publisher'
+        ]
         return bool(found)
+
     robot.until(is_there, f'{kind} of {topic}')
     [info] = found
     return info.topic_type, info.qos_profile.reliability, info.qos_profile.durability
@@ -112,12 +122,20 @@ def test_topics_have_the_types_and_qos_of_the_contract(default_robot):
     robot = default_robot
     volatile = DurabilityPolicy.VOLATILE
     assert endpoint(robot, 'subscriptions', '/joint_states') == (
-        'sensor_msgs/msg/JointState', ReliabilityPolicy.BEST_EFFORT, volatile)
+        'sensor_msgs/msg/JointState',
+        ReliabilityPolicy.BEST_EFFORT,
+        volatile,
+    )
     for foot in FEET:
         assert endpoint(robot, 'publishers', f'/foot_pose_publisher/{foot}/pose') == (
-            'geometry_msgs/msg/PoseStamped', ReliabilityPolicy.RELIABLE, volatile)
+            'geometry_msgs/msg/PoseStamped',
+            ReliabilityPolicy.RELIABLE,
+            volatile,
+        )
     pose = '/foot_pose_publisher/left_foot/pose.publisher'
-    names = [f'qos_overrides.{topic}.depth' for topic in ('/joint_states.subscription', pose)]
+    names = [
+        f'qos_overrides.{topic}.depth' for topic in ('/joint_states.subscription', pose)
+    ]
     answer = robot.result(robot.parameters().get_parameters(names))
     assert [value.integer_value for value in answer.values] == [100, 10]
 
@@ -128,8 +146,12 @@ def test_shipped_parameter_file_holds_the_defaults(default_robot):
     defaults = in_file['ros__parameters']
     answer = robot.result(robot.parameters().get_parameters([*defaults]))
     for value, default in zip(answer.values, defaults.values(), strict=True):
-        given = (value.bool_value, value.double_value, value.string_value,
-                 list(value.string_array_value))
+        given = (
+            value.bool_value,
+            value.double_value,
+            value.string_value,
+            list(value.string_array_value),
+        )
         assert default in given
 
 
@@ -161,17 +183,23 @@ def test_qos_can_be_overridden_by_parameters_and_a_mismatch_is_said(shared):
     # Whoever subscribes late to a transient-local topic gets the last message all the same.
     robot.wait_for(robot.listen(TwistStamped, left, LATE), stamp)
     robot.node.create_publisher(JointState, 'joint_states', BEST_EFFORT)
-    node.wait_for_log("publisher discovered on topic 'joint_states', offering incompatible QoS")
+    node.wait_for_log(
+        "publisher discovered on topic 'joint_states', offering incompatible QoS"
+    )
     robot.listen(TwistStamped, right, DEEP)
-    node.wait_for_log("subscription discovered on topic '~/right_foot/twist', requesting "
-                      'incompatible QoS')
+    node.wait_for_log(
+        "subscription discovered on topic '~/right_foot/twist', requesting "
+        'incompatible QoS'
+    )
 
 
 def test_nodes_in_namespaces_work_side_by_side(robot, default_robot):
     assert robot.change(version='v1').successful
     assert default_robot.change(frame_prefix='blue/').successful
-    for each, version, root in ((robot, 'v1', 'root_link'),
-                                (default_robot, 'v2_5', 'blue/root_link')):
+    for each, version, root in (
+        (robot, 'v1', 'root_link'),
+        (default_robot, 'v2_5', 'blue/root_link'),
+    ):
         stamp = each.connect() + 1
         send_angles(each, stamp)
         each.wait_for(each.left, stamp)
@@ -184,14 +212,23 @@ def test_nodes_in_namespaces_work_side_by_side(robot, default_robot):
 @pytest.fixture(scope='module')
 def renamed():
     """Return a robot beside a node of other names and chains, and the last stamp it sent."""
-    parameters = {'chains': ['head_imu=v2', 'left_leg=v1'], 'foot_frame': 'sole', **RENAMED_QOS}
-    with NodeProcess(parameters, RENAMED) as node, \
-            Robot(node, tips=['head_imu'], name='feet') as robot:
-        robot.torso = robot.node.create_publisher(JointState, '/yarp/state/joints', DEEP)
+    parameters = {
+        'chains': ['head_imu=v2', 'left_leg=v1'],
+        'foot_frame': 'sole',
+        **RENAMED_QOS,
+    }
+    with (
+        NodeProcess(parameters, RENAMED) as node,
+        Robot(node, tips=['head_imu'], name='feet') as robot,
+    ):
+        robot.torso = robot.node.create_publisher(
+            JointState, '/yarp/state/joints', DEEP
+        )
         robot.left = robot.listen(PoseStamped, '/where/left')
         robot.head = robot.poses['head_imu']
-        stamp = robot.connect(names=LEFT + HEAD, inboxes=[robot.head, robot.left],
-                              publisher=robot.torso)
+        stamp = robot.connect(
+            names=LEFT + HEAD, inboxes=[robot.head, robot.left], publisher=robot.torso
+        )
         assert 'head_imu has no sole' in node.log()
         yield node, robot, stamp
 
@@ -201,10 +238,12 @@ def test_topics_and_node_can_be_renamed_and_any_chain_chosen(renamed):
     q = [0.1, 0.2, -0.1, -0.3, 0.2, 0.1]
     head_q = [0.1 * i for i in range(6)]
     robot.send(stamp + 1, LEFT + HEAD, q + head_q, robot.torso)
-    assert_same_pose(robot.take(robot.left, stamp + 1)[-1],
-                     oracle_pose('left_leg', 'v1', q, 'sole'))
-    assert_same_pose(robot.take(robot.head, stamp + 1)[-1],
-                     oracle_pose('head_imu', 'v2', head_q))
+    assert_same_pose(
+        robot.take(robot.left, stamp + 1)[-1], oracle_pose('left_leg', 'v1', q, 'sole')
+    )
+    assert_same_pose(
+        robot.take(robot.head, stamp + 1)[-1], oracle_pose('head_imu', 'v2', head_q)
+    )
 
 
 def test_torso_and_neck_from_two_publishers_interleave_out_of_order(renamed):
@@ -227,7 +266,12 @@ def test_torso_and_neck_from_two_publishers_interleave_out_of_order(renamed):
 
 
 def test_help_is_shown_without_a_node():
-    run = subprocess.run([sys.executable, '-m', 'icub_leg_fk.node.main', '--help'],
-                         capture_output=True, text=True, timeout=30, check=False)
+    run = subprocess.run(
+        [sys.executable, '-m', 'icub_leg_fk.node.main', '--help'],
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+    )
     assert (run.returncode, run.stderr) == (0, '')
     assert 'version' in run.stdout

@@ -24,8 +24,18 @@ from support.node_harness import (
 )
 
 OK, WARN, ERROR, STALE = (
-    DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR, DiagnosticStatus.STALE)
-REASONS = ('malformed', 'empty_position', 'position_length', 'duplicate_name', 'time_jump')
+    DiagnosticStatus.OK,
+    DiagnosticStatus.WARN,
+    DiagnosticStatus.ERROR,
+    DiagnosticStatus.STALE,
+)
+REASONS = (
+    'malformed',
+    'empty_position',
+    'position_length',
+    'duplicate_name',
+    'time_jump',
+)
 DEGREES = [0.0, 0.0, 0.0, -45.0, 0.0, 0.0] * 2
 SILENCE = 'no JointState received on {}/joint_states for '
 NO_TIME = 'use_sim_time is set, but no time has come on /clock'
@@ -34,8 +44,10 @@ NO_TIME = 'use_sim_time is set, but no time has come on /clock'
 @pytest.fixture(scope='module')
 def waiting():
     """Return a node that waits for joint states and for time, and a robot that sends neither."""
-    with NodeProcess({'use_sim_time': True}, ['-r', '/clock:=clock']) as node, \
-            Robot(node) as robot:
+    with (
+        NodeProcess({'use_sim_time': True}, ['-r', '/clock:=clock']) as node,
+        Robot(node) as robot,
+    ):
         robot.node.destroy_publisher(robot.joints)
         robot.node.create_publisher(String, 'joint_states', 10)
         robot.everything = robot.listen(DiagnosticArray, '/diagnostics')
@@ -80,25 +92,36 @@ def test_the_start_line_says_what_is_published_and_from_where(waiting):
     assert lines(node, 'INFO') == [
         'publishing poses of left_foot (left_leg=v2_5, root_link to l_foot_dh_frame), right_foot '
         '(right_leg=v2_5, root_link to r_foot_dh_frame); joint states from '
-        f'{node.namespace}/joint_states']
+        f'{node.namespace}/joint_states'
+    ]
 
 
 def test_stale_until_the_first_joint_state(waiting):
     node, robot = waiting
-    statuses = robot.statuses(lambda statuses: 'only of' in statuses['left_leg'].message)
+    statuses = robot.statuses(
+        lambda statuses: 'only of' in statuses['left_leg'].message
+    )
     assert [*statuses] == ['left_leg', 'right_leg']
     for level, message, _, values in statuses.values():
         assert level == STALE
         assert message.startswith(SILENCE.format(node.namespace))
-        assert '; it has no publisher of this type, only of std_msgs/msg/String; ' in message
+        assert (
+            '; it has no publisher of this type, only of std_msgs/msg/String; '
+            in message
+        )
         assert message.endswith(NO_TIME)
-        assert (values['messages'], values['poses'], values['age (s)']) == ('0', '0', '')
+        assert (values['messages'], values['poses'], values['age (s)']) == (
+            '0',
+            '0',
+            '',
+        )
 
 
 def test_ok_with_rate_age_and_counts(robot):
     status = robot.statuses(
         lambda statuses: float(statuses['left_leg'].values['rate (Hz)']) > 5,
-        meanwhile=lambda: send_now(robot))['left_leg']
+        meanwhile=lambda: send_now(robot),
+    )['left_leg']
     assert (status.level, status.message) == (OK, 'publishing')
     assert status.hardware_id == 'left_leg=v2_5'
     values = status.values
@@ -111,10 +134,15 @@ def test_ok_with_rate_age_and_counts(robot):
 def test_the_age_of_a_dead_leg_beside_a_live_one_grows(robot):
     send_now(robot, ago=3)  # everything held is forgotten
     send_now(robot, LEFT)
-    statuses = robot.statuses(lambda statuses: levels(statuses) == [OK, ERROR],
-                              meanwhile=lambda: send_now(robot, LEFT))
+    statuses = robot.statuses(
+        lambda statuses: levels(statuses) == [OK, ERROR],
+        meanwhile=lambda: send_now(robot, LEFT),
+    )
     _, message, _, values = statuses['right_leg']
-    assert f'has one of its joints ({", ".join(RIGHT)}); names that came: l_hip_pitch' in message
+    assert (
+        f'has one of its joints ({", ".join(RIGHT)}); names that came: l_hip_pitch'
+        in message
+    )
     assert 0 <= float(statuses['left_leg'].values['age (s)']) < 1
     assert float(values['age (s)']) > 3
 
@@ -125,6 +153,7 @@ def test_rejected_messages_are_a_warning_once_and_stay_counted(robot):
 
     def counts(statuses):
         return [int(statuses['right_leg'].values[reason]) for reason in REASONS]
+
     before = counts(robot.statuses(are_ok, meanwhile=send))
     send_now(robot, positions=[0.0] * 13)
     send_now(robot, (*BOTH, 'l_knee'))
@@ -136,10 +165,15 @@ def test_rejected_messages_are_a_warning_once_and_stay_counted(robot):
     def all_are_counted(statuses):  # the five may fall into two periods
         said.append(statuses['right_leg'].message)
         return counts(statuses) == [count + 1 for count in before]
+
     robot.statuses(all_are_counted, meanwhile=send)
     text = '; '.join(said)
-    for words in ('position has 13 values for 12 names', "name 'l_knee' appears twice",
-                  'header.stamp ends at byte 12', 'time stepped back to'):
+    for words in (
+        'position has 13 values for 12 names',
+        "name 'l_knee' appears twice",
+        'header.stamp ends at byte 12',
+        'time stepped back to',
+    ):
         assert text.count(words) == 1, text
     assert 'position is empty' not in text
     after = counts(robot.statuses(are_ok, meanwhile=send))
@@ -151,8 +185,10 @@ def test_joints_out_of_range_and_missing_are_named(robot):
     positions = [0.0] * 5 + [0.6] + [0.0] * 4
     send_now(robot, names, positions, ago=10)  # everything held is forgotten
     missing = 'r_ankle_pitch never seen, r_ankle_roll never seen'
-    statuses = robot.statuses(lambda statuses: missing in statuses['right_leg'].message,
-                              meanwhile=lambda: send_now(robot, names, positions))
+    statuses = robot.statuses(
+        lambda statuses: missing in statuses['right_leg'].message,
+        meanwhile=lambda: send_now(robot, names, positions),
+    )
     level, message, _, values = statuses['left_leg']
     assert level == WARN
     assert 'out of range: l_ankle_roll 0.6' in message
@@ -169,11 +205,13 @@ def test_first_poses_degrees_and_publishers_of_the_same_joints_are_said_once(sha
     def send():
         send_now(robot, positions=DEGREES)
         send_now(robot, positions=DEGREES, publisher=second)
+
     topic = f'{node.namespace}/joint_states'
     two = f'every message on {topic} brings its joints, and it has 2 publishers: '
     for _ in range(2):
-        statuses = robot.statuses(lambda statuses: two in statuses['left_leg'].message,
-                                  meanwhile=send)
+        statuses = robot.statuses(
+            lambda statuses: two in statuses['left_leg'].message, meanwhile=send
+        )
         assert 'positions look like degrees' in statuses['left_leg'].message
     robot.node.destroy_publisher(second)
     said = lines(node, 'WARN')
@@ -187,19 +225,28 @@ def test_first_poses_degrees_and_publishers_of_the_same_joints_are_said_once(sha
 
 def test_another_node_of_the_same_name_is_a_warning(shared):
     node, robot = shared
-    twin = Node('foot_pose_publisher', namespace=node.namespace, context=robot.node.context)
+    twin = Node(
+        'foot_pose_publisher', namespace=node.namespace, context=robot.node.context
+    )
     twin.create_publisher(PoseStamped, '~/left_foot/pose', 10)
     words = f'another node is called {node.namespace}/foot_pose_publisher'
-    robot.statuses(lambda statuses: words in statuses['left_leg'].message,
-                   meanwhile=lambda: send_now(robot))
+    robot.statuses(
+        lambda statuses: words in statuses['left_leg'].message,
+        meanwhile=lambda: send_now(robot),
+    )
     twin.destroy_node()
 
 
 def test_a_change_of_parameters_is_said_once(shared):
     node, robot = shared
     before = len(lines(node, 'INFO'))
-    for changes in ({'joint_timeout': 0.2}, {'version': 'v1'}, {'version': 'v3'},
-                    {'foot_frame': 'sole'}, {'stamp_source': 'now'}):
+    for changes in (
+        {'joint_timeout': 0.2},
+        {'version': 'v1'},
+        {'version': 'v3'},
+        {'foot_frame': 'sole'},
+        {'stamp_source': 'now'},
+    ):
         assert robot.change(**changes).successful
     node.wait_for_log('l_sole')
     said = [line for line in lines(node, 'INFO')[before:] if 'publishing' in line]
@@ -224,13 +271,20 @@ def test_once_a_second_though_simulated_time_stands_still(waiting, shared):
     stamps = []
 
     def are_up_to_date():
-        stamps[:] = [nanoseconds(array.header.stamp) for array in robot.everything
-                     if array.status[0].name.startswith(busy)]
+        stamps[:] = [
+            nanoseconds(array.header.stamp)
+            for array in robot.everything
+            if array.status[0].name.startswith(busy)
+        ]
         return stamps[-1:] > [began]
+
     robot.until(are_up_to_date, stamps)
     periods = [after - before for before, after in pairwise(stamps)]
     assert median(periods) == pytest.approx(SECOND, rel=0.1)
-    others = [nanoseconds(array.header.stamp) for array in robot.everything
-              if not array.status[0].name.startswith(busy)]
+    others = [
+        nanoseconds(array.header.stamp)
+        for array in robot.everything
+        if not array.status[0].name.startswith(busy)
+    ]
     assert others == [0] * len(others)  # simulated time, which has not begun
     assert len(others) >= len(stamps) - 1

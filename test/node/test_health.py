@@ -1,13 +1,23 @@
 """Health in memory: each thing is said once, and again only after it has been well in between."""
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from icub_leg_fk.node.health import HealthLog, notes_around, Surroundings, Totals, verdict
+from icub_leg_fk.node.health import (
+    HealthLog,
+    notes_around,
+    Surroundings,
+    Totals,
+    verdict,
+)
 from icub_leg_fk.stream.notes import notes_of
 import pytest
 from support.leg_input import BOTH, LEFT, LegInput, RIGHT
 
-OK, WARN, ERROR, STALE = (DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR,
-                          DiagnosticStatus.STALE)
+OK, WARN, ERROR, STALE = (
+    DiagnosticStatus.OK,
+    DiagnosticStatus.WARN,
+    DiagnosticStatus.ERROR,
+    DiagnosticStatus.STALE,
+)
 DEGREES = [0.0, 0.0, 0.0, -45.0, 0.0, 0.0]
 
 
@@ -44,7 +54,9 @@ class Watch:
         self.log = HealthLog(Logger(self.said))
         self.totals = Totals()
         self.ms = 0
-        self.around = Surroundings('/joint_states', ['/bridge'], [], 0.0, True, '/node', ['/node'])
+        self.around = Surroundings(
+            '/joint_states', ['/bridge'], [], 0.0, True, '/node', ['/node']
+        )
 
     def looks(self, n=1, names=BOTH, positions=None, **around):
         """Let n looks pass, in each of which two like messages come; return what was said."""
@@ -60,7 +72,9 @@ class Watch:
         look = self.input.take_look()
         self.said.looks += 1
         surroundings = self.around._replace(**around)
-        notes = notes_around(look, surroundings, self.totals) + notes_of(look, '/joint_states')
+        notes = notes_around(look, surroundings, self.totals) + notes_of(
+            look, '/joint_states'
+        )
         self.log.show(notes, look)
         self.totals.add(look)
         self.verdicts = [verdict(look, chain, notes) for chain in look.chains.values()]
@@ -72,7 +86,8 @@ def watch():
     watch = Watch()
     assert watch.looks() == [
         'info: first pose of left_foot; 1 publisher on /joint_states',
-        'info: first pose of right_foot; 1 publisher on /joint_states']
+        'info: first pose of right_foot; 1 publisher on /joint_states',
+    ]
     assert watch.looks(20) == []
     assert watch.verdicts == [(OK, 'publishing')] * 2
     return watch
@@ -90,22 +105,30 @@ def check_is_said_twice(watch, line, patience=1, **bad):
 def test_silence_with_what_was_before_and_who_is_there(watch):
     for n in (42, 44):
         assert watch.looks(4, names=(), silence=4.2, publishers=[]) == []
-        line = (f'no JointState received on /joint_states for 5 s, {n} before; it has no '
-                'publisher')
+        line = (
+            f'no JointState received on /joint_states for 5 s, {n} before; it has no '
+            'publisher'
+        )
         assert watch.looks(3, names=(), silence=5.2, publishers=[]) == [line]
         assert watch.verdicts == [(STALE, line)] * 2
         assert watch.looks() == []
 
 
 def test_silence_with_publishers_of_another_type():
-    [line] = Watch().looks(5, names=(), publishers=[], other_types=['std_msgs/msg/String'])
-    assert line.endswith('; it has no publisher of this type, only of std_msgs/msg/String')
+    [line] = Watch().looks(
+        5, names=(), publishers=[], other_types=['std_msgs/msg/String']
+    )
+    assert line.endswith(
+        '; it has no publisher of this type, only of std_msgs/msg/String'
+    )
 
 
 def test_names_that_never_match(watch):
     wanted = ', '.join(LEFT)
-    line = (f'left_leg: no message on /joint_states has one of its joints ({wanted}); names that '
-            f'came: {", ".join(RIGHT)}')
+    line = (
+        f'left_leg: no message on /joint_states has one of its joints ({wanted}); names that '
+        f'came: {", ".join(RIGHT)}'
+    )
     check_is_said_twice(watch, line, patience=5, names=RIGHT)
 
 
@@ -131,12 +154,18 @@ def test_degrees(watch):
     text = 'positions look like degrees, radians are expected: l_knee -45'
     check_is_said_twice(watch, f'left_leg: {text}', positions=DEGREES + [0.0] * 6)
     watch.looks(positions=DEGREES + [0.0] * 6)
-    assert watch.verdicts == [(WARN, f'{text}; out of range: l_knee -45'), (OK, 'publishing')]
+    assert watch.verdicts == [
+        (WARN, f'{text}; out of range: l_knee -45'),
+        (OK, 'publishing'),
+    ]
 
 
 def test_out_of_range_is_for_diagnostics_alone(watch):
     assert watch.looks(9, positions=[0.0] * 5 + [0.6] + [0.0] * 6) == []
-    assert watch.verdicts == [(WARN, 'out of range: l_ankle_roll 0.6'), (OK, 'publishing')]
+    assert watch.verdicts == [
+        (WARN, 'out of range: l_ankle_roll 0.6'),
+        (OK, 'publishing'),
+    ]
 
 
 def test_rejected_messages_are_said_every_five_seconds(watch):
@@ -147,9 +176,14 @@ def test_rejected_messages_are_said_every_five_seconds(watch):
 
 def test_what_holds_chains_back_is_said_every_five_seconds(watch):
     positions = [float('nan'), *[0.0] * 10, float('inf')]
-    assert watch.looks(6, positions=positions) == [
-        'left_leg: no pose from 2 messages: l_hip_pitch nan; '
-        'right_leg: no pose from 2 messages: r_ankle_roll inf'] * 2
+    assert (
+        watch.looks(6, positions=positions)
+        == [
+            'left_leg: no pose from 2 messages: l_hip_pitch nan; '
+            'right_leg: no pose from 2 messages: r_ankle_roll inf'
+        ]
+        * 2
+    )
     assert watch.verdicts[0] == (ERROR, 'no pose from 2 messages: l_hip_pitch nan')
 
 
@@ -157,7 +191,9 @@ def test_a_chain_whose_joints_come_without_positions_gives_no_pose(watch):
     watch.input.send(watch.ms, LEFT, [])
     watch.looks(1, names=RIGHT)
     assert watch.verdicts == [
-        (ERROR, 'no message with a position of its joints'), (OK, 'publishing')]
+        (ERROR, 'no message with a position of its joints'),
+        (OK, 'publishing'),
+    ]
 
 
 def test_every_loop_of_a_bag_is_said(watch):
@@ -165,8 +201,10 @@ def test_every_loop_of_a_bag_is_said(watch):
         for ms in range(1000, 1200, 10):
             watch.input.send(ms)
         watch.look()
-    assert watch.said[2:] == [
-        'time stepped back to 1700000001.000 s; held joints are forgotten'] * 2
+    assert (
+        watch.said[2:]
+        == ['time stepped back to 1700000001.000 s; held joints are forgotten'] * 2
+    )
 
 
 def test_publishers_that_seem_to_bring_the_same_joints(watch):
@@ -176,7 +214,8 @@ def test_publishers_that_seem_to_bring_the_same_joints(watch):
         'left_leg: every message on /joint_states brings its joints, and it has 2 publishers: '
         '/bridge, /ns/sim',
         'right_leg: every message on /joint_states brings its joints, and it has 2 publishers: '
-        '/bridge, /ns/sim']
+        '/bridge, /ns/sim',
+    ]
     assert [level for level, _ in watch.verdicts] == [WARN, WARN]
 
 
@@ -195,6 +234,10 @@ def test_simulated_time_that_has_not_begun(watch):
 
 
 def test_another_node_of_the_same_name(watch):
-    line = ('another node is called /node and publishes the same topics; give one of them another '
-            'name: --ros-args -r __node:=NAME')
-    check_is_said_twice(watch, line, patience=5, pose_publishers=['/node', '/other', '/node'])
+    line = (
+        'another node is called /node and publishes the same topics; give one of them another '
+        'name: --ros-args -r __node:=NAME'
+    )
+    check_is_said_twice(
+        watch, line, patience=5, pose_publishers=['/node', '/other', '/node']
+    )

@@ -11,7 +11,16 @@ import pytest
 from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
-from support.node_harness import BOTH, DEEP, LEFT, LOSSLESS, NodeProcess, RIGHT, Robot, SECOND
+from support.node_harness import (
+    BOTH,
+    DEEP,
+    LEFT,
+    LOSSLESS,
+    NodeProcess,
+    RIGHT,
+    Robot,
+    SECOND,
+)
 from support.node_oracle import assert_same_pose, oracle_pose
 
 MS = 1_000_000  # ns
@@ -53,7 +62,9 @@ def take_both(robot, stamp):
 def test_one_message_per_leg_moves_that_leg_only(robot):
     t = robot.start + MS
     robot.send(t, LEFT, Q[:6])
-    robot.send(t - 3000, RIGHT, Q[6:])  # another part's controller, whose clock lags a little
+    robot.send(
+        t - 3000, RIGHT, Q[6:]
+    )  # another part's controller, whose clock lags a little
     robot.send(t + MS, LEFT, Q[:6])
     assert robot.take(robot.left, t + MS).stamps() == [t, t + MS]
     assert robot.take(robot.right, t - 3000).stamps() == [t - 3000]
@@ -74,7 +85,9 @@ def test_other_joints_and_all_other_fields_are_nobodys_business(robot):
     robot.send(t, ('gripper', 'wheel'), [1.0, math.nan])
     names = ('neck', *LEFT, 'wheel', *RIGHT)
     positions = [math.nan, *Q[:6], math.inf, *Q[6:]]
-    message = JointState(name=names, position=positions, velocity=[math.nan], effort=[1.0] * 3)
+    message = JointState(
+        name=names, position=positions, velocity=[math.nan], effort=[1.0] * 3
+    )
     message.header.frame_id = 'base_link'
     message.header.stamp.sec, message.header.stamp.nanosec = divmod(t + 1, SECOND)
     robot.joints.publish(message)
@@ -96,11 +109,13 @@ def hostile_bytes():
     for size in range(5, len(good) - 8, 7):
         yield good[:size]
     for at in (12, 20, 24, 40):  # lengths of frame_id, of name and of the first names
-        for length in (0x7fffffff, 0xffffffff, 0x80000000, 1000):
-            yield good[:at] + length.to_bytes(4, 'little') + good[at + 4:]
+        for length in (0x7FFFFFFF, 0xFFFFFFFF, 0x80000000, 1000):
+            yield good[:at] + length.to_bytes(4, 'little') + good[at + 4 :]
 
 
-def test_what_cannot_be_used_changes_nothing_and_is_said_without_flooding_the_log(node, robot):
+def test_what_cannot_be_used_changes_nothing_and_is_said_without_flooding_the_log(
+    node, robot
+):
     began = time.monotonic()
     before = len(node.log())
     t = robot.start + MS
@@ -120,12 +135,19 @@ def test_what_cannot_be_used_changes_nothing_and_is_said_without_flooding_the_lo
     check_left(robot.take(robot.left, t)[-1], Q[:6], t)
     robot.send(t + MS, BOTH, Q)
     assert take_both(robot, t + MS) == [[t + MS], [robot.start + MS, t + MS]]
-    words = ('messages rejected: JointState: ', 'messages rejected: position has 13 values for 12',
-             "messages rejected: name 'l_knee' appears twice", 'r_ankle_roll nan')
+    words = (
+        'messages rejected: JointState: ',
+        'messages rejected: position has 13 values for 12',
+        "messages rejected: name 'l_knee' appears twice",
+        'r_ankle_roll nan',
+    )
     for word in words:
         node.wait_for_log(word)
-    said = [line for line in node.log()[before:].splitlines()
-            if ' rejected: ' in line or ' no pose ' in line]
+    said = [
+        line
+        for line in node.log()[before:].splitlines()
+        if ' rejected: ' in line or ' no pose ' in line
+    ]
     most = 1 + (time.monotonic() - began) // 5  # each is repeated after 5 s
     for word in words:
         assert 1 <= sum(word in line for line in said) <= most, (word, said)
@@ -187,6 +209,7 @@ def test_simulated_time_stamps_what_has_no_stamp_and_may_step_back(robot):
             robot.send(0)
             robot.spin(0.02)
             return stamp in robot.right.stamps()[-1:]
+
         robot.until(answered, f'poses at {stamp}')
         robot.until(lambda: len(robot.left) == len(robot.right), 'both feet')
 

@@ -11,12 +11,16 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 MS = 1_000_000  # ns
 Q = np.array([0.2, 0.1, -0.1, -0.5, -0.3, 0.1, 0.15, 0.05, 0.1, -0.4, -0.2, -0.1])
-CHAINS = dict(zip(FEET, (('left_leg', slice(6)), ('right_leg', slice(6, 12))), strict=True))
+CHAINS = dict(
+    zip(FEET, (('left_leg', slice(6)), ('right_leg', slice(6, 12))), strict=True)
+)
 SOLE = [[-0.07, 0.04, 0.0], [0.12, 0.04, 0.0], [0.12, -0.04, 0.0], [-0.07, -0.04, 0.0]]
 POSE_TOPICS = {f'{tip}/pose' for tip in FEET}
 TWIST_TOPICS = {f'{tip}/twist' for tip in FEET}
-TWIST_DEPTH = {f'qos_overrides.{{ns}}/foot_pose_publisher/{tip}/twist.publisher.depth': 5000
-               for tip in FEET}
+TWIST_DEPTH = {
+    f'qos_overrides.{{ns}}/foot_pose_publisher/{tip}/twist.publisher.depth': 5000
+    for tip in FEET
+}
 
 
 @pytest.fixture(scope='module')
@@ -32,13 +36,15 @@ class Twists:
 
     def __init__(self, node, robot):
         self.robot = robot
-        self.inboxes = {tip: robot.listen(TwistStamped, node.topic(f'{tip}/twist'))
-                        for tip in FEET}
+        self.inboxes = {
+            tip: robot.listen(TwistStamped, node.topic(f'{tip}/twist')) for tip in FEET
+        }
         self.stamp = robot.connect() + SECOND
 
         def answered():
             self.send(Q, np.zeros(12))
             return all(self.inboxes.values())
+
         robot.until(answered, 'twists of both feet')
         self.answers()
 
@@ -49,8 +55,12 @@ class Twists:
 
     def answers(self):
         """Wait for the answers to the last message and empty all inboxes."""
-        poses = {tip: self.robot.take(self.robot.poses[tip], self.stamp) for tip in FEET}
-        return poses, {tip: self.robot.take(self.inboxes[tip], self.stamp) for tip in FEET}
+        poses = {
+            tip: self.robot.take(self.robot.poses[tip], self.stamp) for tip in FEET
+        }
+        return poses, {
+            tip: self.robot.take(self.inboxes[tip], self.stamp) for tip in FEET
+        }
 
 
 @pytest.fixture(scope='module')
@@ -73,6 +83,7 @@ def own_topics(node, robot, wanted):
         found = robot.node.get_publisher_names_and_types_by_node(name, namespace)
         offered.update(topic for topic, _ in found)
         return wanted <= offered
+
     robot.until(is_there, offered)
     return {topic.removeprefix(node.topic('')) for topic in offered}
 
@@ -86,7 +97,10 @@ def test_no_other_topic_is_offered_unless_asked_for(shared):
     assert own <= offered
     assert offered - own <= {'/diagnostics', '/rosout', '/parameter_events'}
     assert robot.change(publish_twist=False).successful
-    robot.until(lambda: own_topics(node, robot, POSE_TOPICS).isdisjoint(TWIST_TOPICS), 'no twists')
+    robot.until(
+        lambda: own_topics(node, robot, POSE_TOPICS).isdisjoint(TWIST_TOPICS),
+        'no twists',
+    )
 
 
 def vector(twist):
@@ -106,12 +120,20 @@ def test_twist_is_the_jacobian_times_the_velocities(twists):
             assert answers[tip][0].header.frame_id == 'root_link'
             J = oracle_jacobian(chain, 'v2_5', q[part])
             np.testing.assert_allclose(
-                vector(answers[tip][0]), J @ qdot[part], rtol=0, atol=1e-12)
+                vector(answers[tip][0]), J @ qdot[part], rtol=0, atol=1e-12
+            )
 
 
-@pytest.mark.parametrize(('qdot', 'feet'), [
-    ([], []), ([0.1] * 11, []), ([0.1] * 11 + [np.nan], ['left_foot']),
-    ([np.inf] + [0.1] * 11, ['right_foot'])], ids=['none', 'short', 'nan', 'inf'])
+@pytest.mark.parametrize(
+    ('qdot', 'feet'),
+    [
+        ([], []),
+        ([0.1] * 11, []),
+        ([0.1] * 11 + [np.nan], ['left_foot']),
+        ([np.inf] + [0.1] * 11, ['right_foot']),
+    ],
+    ids=['none', 'short', 'nan', 'inf'],
+)
 def test_no_twist_without_all_velocities_but_the_pose_goes_out(twists, qdot, feet):
     twists.send(Q, qdot)
     bad = twists.stamp
@@ -122,7 +144,9 @@ def test_no_twist_without_all_velocities_but_the_pose_goes_out(twists, qdot, fee
         assert (bad in answers[tip].stamps()) == (tip in feet)
 
 
-def test_frame_prefix_holds_for_twists_and_topics_go_when_they_are_switched_off(shared, twists):
+def test_frame_prefix_holds_for_twists_and_topics_go_when_they_are_switched_off(
+    shared, twists
+):
     node, robot = shared
     assert robot.change(frame_prefix='a/').successful
     twists.send(Q, np.ones(12))
@@ -130,7 +154,9 @@ def test_frame_prefix_holds_for_twists_and_topics_go_when_they_are_switched_off(
     assert answers['left_foot'][0].header.frame_id == 'a/root_link'
     assert robot.change(publish_twist=False, frame_prefix='').successful
     topic = node.topic('left_foot/twist')
-    robot.until(lambda: robot.node.count_publishers(topic) == 0, 'the twist topic to go')
+    robot.until(
+        lambda: robot.node.count_publishers(topic) == 0, 'the twist topic to go'
+    )
 
 
 def points_of(marker):
@@ -139,15 +165,20 @@ def points_of(marker):
 
 def test_skeletons_go_through_the_frames_of_each_leg_to_the_outline_of_its_sole(shared):
     node, robot = shared
-    assert robot.change(publish_markers=True, frame_prefix='x/', foot_frame='sole').successful
+    assert robot.change(
+        publish_markers=True, frame_prefix='x/', foot_frame='sole'
+    ).successful
     inbox = []
-    robot.node.create_subscription(MarkerArray, node.topic('skeleton'), inbox.append, 10)
+    robot.node.create_subscription(
+        MarkerArray, node.topic('skeleton'), inbox.append, 10
+    )
     by_chain = {}
 
     def both_skeletons():
         robot.send(SECOND, BOTH, Q)
         by_chain.update({array.markers[0].ns: array.markers for array in inbox})
         return len(by_chain) >= 2
+
     robot.until(both_skeletons, 'skeletons')
     assert set(by_chain) == {'left_leg', 'right_leg'}
     for chain, part in CHAINS.values():
@@ -155,9 +186,13 @@ def test_skeletons_go_through_the_frames_of_each_leg_to_the_outline_of_its_sole(
             assert marker.header.frame_id == 'x/root_link'
             assert (marker.header.stamp.sec, marker.header.stamp.nanosec) == (1, 0)
             assert (marker.action, marker.color.a) == (Marker.ADD, 1.0)
-        bones, joints, sole = by_chain[chain]
-        assert (bones.type, joints.type, sole.type) == (
-            Marker.LINE_STRIP, Marker.SPHERE_LIST, Marker.LINE_STRIP)
+        bones, joints, name, sole = by_chain[chain]
+        assert (bones.type, joints.type, name.type, sole.type) == (
+            Marker.LINE_STRIP,
+            Marker.SPHERE_LIST,
+            Marker.TEXT_VIEW_FACING,
+            Marker.LINE_STRIP,
+        )
         frames = Catalog.load().chain(chain, 'v2_5', 'sole').frames(Q[part])
         foot = oracle_pose(chain, 'v2_5', Q[part])[:3, 3]
         for marker in (bones, joints):
@@ -174,17 +209,23 @@ def test_viewers_forget_the_skeletons_of_what_is_published_no_more(shared):
     node, robot = shared
     assert robot.change(publish_markers=True).successful
     inbox = []
-    robot.node.create_subscription(MarkerArray, node.topic('skeleton'), inbox.append, 10)
+    robot.node.create_subscription(
+        MarkerArray, node.topic('skeleton'), inbox.append, 10
+    )
 
     def is_heard():
         robot.send(SECOND, BOTH, Q)
         return bool(inbox)
+
     robot.until(is_heard, 'skeletons')
     assert robot.change(version='v1').successful
-    robot.until(lambda: any(array.markers[0].action == Marker.DELETEALL for array in inbox),
-                'removal of the skeletons')
+    robot.until(
+        lambda: any(array.markers[0].action == Marker.DELETEALL for array in inbox),
+        'removal of the skeletons',
+    )
     assert robot.change(
-        version='v2_5', publish_markers=False, frame_prefix='', foot_frame='dh').successful
+        version='v2_5', publish_markers=False, frame_prefix='', foot_frame='dh'
+    ).successful
 
 
 def test_transforms_are_refused_in_one_line_where_tf2_msgs_is_missing(shared):
@@ -199,13 +240,18 @@ def test_transforms_are_refused_in_one_line_where_tf2_msgs_is_missing(shared):
         pytest.skip(f'tf2_msgs is there: {tf2_msgs.__file__}')
 
 
-@pytest.mark.parametrize(('foot_frame', 'children'), [
-    ('dh', ['l_foot_dh_frame', 'r_foot_dh_frame']), ('sole', ['l_sole', 'r_sole'])])
+@pytest.mark.parametrize(
+    ('foot_frame', 'children'),
+    [('dh', ['l_foot_dh_frame', 'r_foot_dh_frame']), ('sole', ['l_sole', 'r_sole'])],
+)
 def test_transforms_are_those_of_the_poses(shared, foot_frame, children):
     messages = pytest.importorskip(
-        'tf2_msgs.msg', reason='tf2_msgs is not installed, nothing can be sent to /tf')
+        'tf2_msgs.msg', reason='tf2_msgs is not installed, nothing can be sent to /tf'
+    )
     _, robot = shared
-    assert robot.change(publish_tf=True, frame_prefix='x/', foot_frame=foot_frame).successful
+    assert robot.change(
+        publish_tf=True, frame_prefix='x/', foot_frame=foot_frame
+    ).successful
     inbox = []
     robot.node.create_subscription(messages.TFMessage, '/tf', inbox.append, 10)
     found = {}
@@ -216,15 +262,21 @@ def test_transforms_are_those_of_the_poses(shared, foot_frame, children):
             assert len(message.transforms) == 2
             found.update({item.child_frame_id: item for item in message.transforms})
         return len(found) >= 2
+
     robot.until(both_transforms, 'transforms')
     qos = robot.node.get_publishers_info_by_topic('/tf')[0].qos_profile
     assert (qos.reliability, qos.durability) == (
-        ReliabilityPolicy.RELIABLE, DurabilityPolicy.VOLATILE)
+        ReliabilityPolicy.RELIABLE,
+        DurabilityPolicy.VOLATILE,
+    )
     for child, (chain, part) in zip(children, CHAINS.values(), strict=True):
         transform = found[f'x/{child}']
         assert transform.header.frame_id == 'x/root_link'
         assert transform.header.stamp.sec == 1
         np.testing.assert_allclose(
-            pose_matrix(transform.transform), oracle_pose(chain, 'v2_5', Q[part], foot_frame),
-            rtol=0, atol=1e-12)
+            pose_matrix(transform.transform),
+            oracle_pose(chain, 'v2_5', Q[part], foot_frame),
+            rtol=0,
+            atol=1e-12,
+        )
     assert robot.change(publish_tf=False, frame_prefix='', foot_frame='dh').successful

@@ -1,5 +1,6 @@
 """The node's parameters, changed while it runs through the standard services."""
 
+import itertools
 from pathlib import Path
 
 from icub_leg_fk.kinematics import config_file
@@ -14,7 +15,16 @@ import yaml
 MS = 1_000_000  # ns
 Q = [0.2, 0.1, -0.1, -0.5, -0.3, 0.1, 0.15, 0.05, 0.1, -0.4, -0.2, -0.1]
 DEFAULTS = {parameter.name: parameter.default for parameter in PARAMETERS}
-LIVE = {parameter.name: parameter.default for parameter in PARAMETERS if parameter.is_live}
+READ_ONLY = (
+    'chains',
+    'kinematics_file',
+    'description_from_topic',
+    'root_frame',
+    'joint_prefix',
+)
+LIVE = {
+    parameter.name: parameter.default for parameter in PARAMETERS if parameter.is_live
+}
 
 
 class Feet:
@@ -33,8 +43,10 @@ class Feet:
     def check(self, left='v2_5', right='v2_5', foot_frame='dh', frame_prefix=''):
         """Check that the next poses are those of these versions."""
         stamp = self.send()
-        sides = {'left_foot': ('left_leg', left, Q[:6]),
-                 'right_foot': ('right_leg', right, Q[6:])}
+        sides = {
+            'left_foot': ('left_leg', left, Q[:6]),
+            'right_foot': ('right_leg', right, Q[6:]),
+        }
         for tip, chain in sides.items():
             pose = self.robot.take(self.robot.poses[tip], stamp)[-1]
             assert_same_pose(pose, oracle_pose(*chain, foot_frame))
@@ -61,11 +73,18 @@ def feet(shared):
     assert result.successful, result.reason
 
 
-@pytest.mark.parametrize('changes, expected', [
-    ({'version': 'v1'}, {'left': 'v1', 'right': 'v1'}),
-    ({'frame_prefix': 'icub1/'}, {'frame_prefix': 'icub1/'}),
-    ({'foot_frame': 'sole', 'version': 'v3'}, {'left': 'v3', 'right': 'v3', 'foot_frame': 'sole'}),
-], ids=str)
+@pytest.mark.parametrize(
+    'changes, expected',
+    [
+        ({'version': 'v1'}, {'left': 'v1', 'right': 'v1'}),
+        ({'frame_prefix': 'icub1/'}, {'frame_prefix': 'icub1/'}),
+        (
+            {'foot_frame': 'sole', 'version': 'v3'},
+            {'left': 'v3', 'right': 'v3', 'foot_frame': 'sole'},
+        ),
+    ],
+    ids=str,
+)
 def test_change_shows_in_the_very_next_poses(feet, changes, expected):
     feet.check()
     result = feet.robot.change(**changes)
@@ -90,18 +109,28 @@ def test_joint_timeout_and_stamps_change_live(feet):
     robot.right.clear()
 
 
-@pytest.mark.parametrize('changes, words', [
-    ({'version': 'v2.5'}, "unknown version of chain left_leg 'v2.5'; did you mean 'v2_5'?"),
-    ({'version': 'v1', 'frame_prefix': 'x/', 'foot_frame': 'toe'}, 'allowed: dh or sole'),
-    ({'joint_timeout': float('nan')}, 'joint_timeout'),
-    ({'joint_timeout': -0.1}, 'joint_timeout'),
-    ({'version': 'v1', 'chains': ['left_leg']}, 'read-only'),
-    ({'kinematics_file': '/no/such.yaml'}, 'read-only'),
-    ({'version': 3}, 'type'),
-    ({'versoin': 'v1'}, 'undeclared'),
-    ({'version': 'v1', 'joint_timeout': None}, 'cannot be undeclared'),
-    ({'use_sim_time': 3}, 'type'),
-], ids=str)
+@pytest.mark.parametrize(
+    'changes, words',
+    [
+        (
+            {'version': 'v2.5'},
+            "unknown version 'v2.5' of chain left_leg; did you mean 'v2_5'?",
+        ),
+        (
+            {'version': 'v1', 'frame_prefix': 'x/', 'foot_frame': 'toe'},
+            'allowed: dh or sole',
+        ),
+        ({'joint_timeout': float('nan')}, 'joint_timeout'),
+        ({'joint_timeout': -0.1}, 'joint_timeout'),
+        ({'version': 'v1', 'chains': ['left_leg']}, 'read-only'),
+        ({'kinematics_file': '/no/such.yaml'}, 'read-only'),
+        ({'version': 3}, 'type'),
+        ({'versoin': 'v1'}, 'undeclared'),
+        ({'version': 'v1', 'joint_timeout': None}, 'cannot be undeclared'),
+        ({'use_sim_time': 3}, 'type'),
+    ],
+    ids=str,
+)
 def test_bad_set_is_refused_with_a_reason_and_changes_nothing(feet, changes, words):
     result = feet.robot.change(**changes)
     assert not result.successful
@@ -123,49 +152,66 @@ def test_every_parameter_is_described(feet):
     client = feet.robot.parameters()
     names = feet.robot.result(client.list_parameters()).result.names
     assert set(DEFAULTS) <= set(names)
-    described = feet.robot.result(client.describe_parameters(list(DEFAULTS))).descriptors
+    described = feet.robot.result(
+        client.describe_parameters(list(DEFAULTS))
+    ).descriptors
     for descriptor in described:
         assert descriptor.description.endswith('.'), descriptor.name
         assert descriptor.additional_constraints, descriptor.name
         assert descriptor.type != ParameterType.PARAMETER_NOT_SET
-        assert descriptor.read_only == (descriptor.name in ('chains', 'kinematics_file'))
-    [timeout] = [descriptor for descriptor in described if descriptor.name == 'joint_timeout']
+        assert descriptor.read_only == (descriptor.name in READ_ONLY)
+    [timeout] = [
+        descriptor for descriptor in described if descriptor.name == 'joint_timeout'
+    ]
     bounds = timeout.floating_point_range[0]
     assert (bounds.from_value, bounds.to_value) == (0.0, 1e6)
 
 
 def test_no_pose_is_lost_or_mixed_while_parameters_change(feet):
     robot = feet.robot
-    settings = [{'version': version, 'foot_frame': frame, 'frame_prefix': f'{version}_{frame}/'}
-                for version in ('v1', 'v2_5', 'v3') for frame in ('dh', 'sole')]
+    settings = list(itertools.product(('v1', 'v2_5', 'v3'), ('dh', 'sole')))
     sent = []
-    for change in settings * 3:
+    for version, frame in settings * 3:
+        changes = {
+            'version': version,
+            'foot_frame': frame,
+            'frame_prefix': f'{version}/{frame}/',
+        }
         future = robot.parameters().set_parameters_atomically(
-            [Parameter(name, value=value) for name, value in change.items()])
+            [Parameter(name, value=value) for name, value in changes.items()]
+        )
         for _ in range(30):
             sent.append(feet.send())
             robot.spin()
         assert robot.result(future).result.successful
-    allowed = {f'{change["frame_prefix"]}root_link': change for change in settings}
-    allowed['root_link'] = {'version': 'v2_5', 'foot_frame': 'dh'}
-    frames = []
-    for tip, chain, q in (('left_foot', 'left_leg', Q[:6]), ('right_foot', 'right_leg', Q[6:])):
+    frame_ids = []
+    for tip, chain, q in (
+        ('left_foot', 'left_leg', Q[:6]),
+        ('right_foot', 'right_leg', Q[6:]),
+    ):
         poses = robot.take(robot.poses[tip], sent[-1])
         assert poses.stamps() == sent
-        frames.append([pose.header.frame_id for pose in poses])
-        for pose in poses:
-            change = allowed[pose.header.frame_id]
-            assert_same_pose(pose, oracle_pose(chain, change['version'], q, change['foot_frame']))
-    assert frames[0] == frames[1]
-    assert len(set(frames[0])) >= len(settings)
+        frame_ids.append([pose.header.frame_id for pose in poses])
+        for pose in poses:  # its prefix names what it must be computed with
+            version, frame, _ = f'v2_5/dh/{pose.header.frame_id}'.split('/')[-3:]
+            assert_same_pose(pose, oracle_pose(chain, version, q, frame))
+    assert frame_ids[0] == frame_ids[1]
+    assert len(set(frame_ids[0])) >= len(settings)
 
 
 def test_chains_with_versions_of_another_file_are_given_at_start(tmp_path):
     text = config_file('icub_kinematics.yaml').read_text()
-    (tmp_path / 'longer.yaml').write_text(text.replace('[0,  0, 1,  -68.1]', '[0,  0, 1, -168.1]'))
-    parameters = {'kinematics_file': '~/longer.yaml', 'chains': ['left_leg=v1', 'right_leg']}
-    with NodeProcess(parameters | LOSSLESS, environment={'HOME': str(tmp_path)}) as node, \
-            Robot(node) as robot:
+    (tmp_path / 'longer.yaml').write_text(
+        text.replace('[0,  0, 1,  -68.1]', '[0,  0, 1, -168.1]')
+    )
+    parameters = {
+        'kinematics_file': '~/longer.yaml',
+        'chains': ['left_leg=v1', 'right_leg'],
+    }
+    with (
+        NodeProcess(parameters | LOSSLESS, environment={'HOME': str(tmp_path)}) as node,
+        Robot(node) as robot,
+    ):
         stamp = Feet(robot).send()
         expected = oracle_pose('left_leg', 'v1', Q[:6])
         expected[1, 3] -= 0.1

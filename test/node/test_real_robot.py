@@ -42,12 +42,17 @@ def test_every_pose_arrives_once_in_order_with_the_stamp_of_its_message(walk):
 
 def test_every_pose_is_pinocchios(walk):
     _, positions, _, poses = walk
-    for foot, chain, part in (('left_foot', 'left_leg', slice(6)),
-                              ('right_foot', 'right_leg', slice(6, 12))):
+    for foot, chain, part in (
+        ('left_foot', 'left_leg', slice(6)),
+        ('right_foot', 'right_leg', slice(6, 12)),
+    ):
         for message, row in zip(poses[foot], positions, strict=True):
             np.testing.assert_allclose(
                 pose_matrix(message.pose),
-                oracle_pose(chain, 'v2_5', row[part], 'sole'), rtol=0, atol=1e-12)
+                oracle_pose(chain, 'v2_5', row[part], 'sole'),
+                rtol=0,
+                atol=1e-12,
+            )
 
 
 def matrices(poses):
@@ -63,7 +68,9 @@ def test_soles_are_parallel_and_level_while_both_feet_stand(walk):
     normals = np.einsum('ij,ij->i', left[:, :3, 2], right[:, :3, 2])
     angle_deg = np.degrees(np.arccos(np.clip(normals, -1, 1)))
     # Of the right sole above the left one, on the floor that the left one is level with.
-    height_mm = 1000 * np.einsum('ij,ij->i', right[:, :3, 3] - left[:, :3, 3], left[:, :3, 2])
+    height_mm = 1000 * np.einsum(
+        'ij,ij->i', right[:, :3, 3] - left[:, :3, 3], left[:, :3, 2]
+    )
     assert angle_deg.mean() == pytest.approx(0.54, abs=0.005)
     assert height_mm.mean() == pytest.approx(-0.10, abs=0.005)
     assert height_mm.std() == pytest.approx(0.49, abs=0.005)

@@ -1,51 +1,125 @@
-"""The layouts of the viewers: keys that Lichtblick reads, and topics that the node has."""
+"""The layouts of the viewers: keys that Lichtblick reads, and topics and colours of the node."""
 
 import json
 from pathlib import Path
 import re
 
+from builtin_interfaces.msg import Time
+from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.node.skeleton import skeleton_markers
+from icub_leg_fk.stream.colors import color_of
+from icub_leg_fk.stream.configuration import Configuration
+from icub_leg_fk.tools.rviz_config import rviz_config
+import pytest
+import yaml
+
 CONFIG = Path(__file__).resolve().parents[2] / 'config'
-TOPICS = {f'/foot_pose_publisher/{name}'
-          for name in ('left_foot/pose', 'right_foot/pose', 'skeleton')}
+TOPICS = {
+    f'/foot_pose_publisher/{name}'
+    for name in ('left_foot/pose', 'right_foot/pose', 'skeleton')
+}
 # Keys that Lichtblick's public source reads, under packages/suite-base/src: PlotConfig in
 # panels/Plot/utils/config.ts, RendererConfig in panels/ThreeDeeRender/IRenderer.ts, those of
 # panels/DiagnosticSummary, and PANEL_TITLE_CONFIG_KEY in util/layout.ts. Foxglove's own is the
 # other title.
 TITLES = {'lichtblickPanelTitle', 'foxglovePanelTitle'}
 KEYS = {
-    'Plot': {'paths', 'isSynced', 'xAxisVal', 'showXAxisLabels', 'showYAxisLabels', 'showLegend',
-             'legendDisplay'},
-    '3D': {'followTf', 'followMode', 'scene', 'cameraState', 'topics', 'layers', 'transforms',
-           'publish', 'imageMode'},
-    'DiagnosticSummary': {'topicToRender', 'minLevel', 'pinnedIds', 'hardwareIdFilter',
-                          'sortByLevel'},
+    'Plot': {
+        'paths',
+        'isSynced',
+        'xAxisVal',
+        'showXAxisLabels',
+        'showYAxisLabels',
+        'showLegend',
+        'legendDisplay',
+    },
+    '3D': {
+        'followTf',
+        'followMode',
+        'scene',
+        'cameraState',
+        'topics',
+        'layers',
+        'transforms',
+        'publish',
+        'imageMode',
+    },
+    'DiagnosticSummary': {
+        'topicToRender',
+        'minLevel',
+        'pinnedIds',
+        'hardwareIdFilter',
+        'sortByLevel',
+    },
 }
 
 
-def layout() -> dict:
+@pytest.fixture(scope='module')
+def layout():
     return json.loads((CONFIG / 'foot_poses_foxglove.json').read_text())
 
 
-def test_every_panel_has_keys_that_are_read_and_a_title() -> None:
-    for name, config in layout()['configById'].items():
+def rviz(configuration, node='/foot_pose_publisher'):
+    return yaml.safe_load(rviz_config(configuration, node))['Visualization Manager']
+
+
+def test_every_panel_has_keys_that_are_read_and_a_title(layout):
+    for name, config in layout['configById'].items():
         assert set(config) <= KEYS[name.partition('!')[0]] | TITLES, name
         assert config['foxglovePanelTitle'] == config['lichtblickPanelTitle'] != ''
 
 
-def test_every_panel_of_the_layout_is_there_once() -> None:
-    shown = re.findall(r'"(?:first|second)": "([^"]+)"', json.dumps(layout()['layout']))
-    assert sorted(shown) == sorted(layout()['configById'])
+def test_every_panel_of_the_layout_is_there_once(layout):
+    shown = re.findall(r'"(?:first|second)": "([^"]+)"', json.dumps(layout['layout']))
+    assert sorted(shown) == sorted(layout['configById'])
 
 
-def test_the_topics_are_those_of_the_node() -> None:
-    text = json.dumps(layout())
+def test_the_topics_of_the_layout_are_those_of_the_node(layout):
+    text = json.dumps(layout)
     assert set(re.findall(r'/foot_pose_publisher/[a-z_]+(?:/pose)?', text)) == TOPICS
-    rviz = (CONFIG / 'foot_poses.rviz').read_text()
-    assert set(re.findall(r'Value: (/foot_pose_publisher/.*)', rviz)) == TOPICS
 
 
-def test_rviz_draws_the_axes_of_a_foot_once() -> None:
-    rviz = (CONFIG / 'foot_poses.rviz').read_text()
-    tf = rviz[rviz.index('rviz_default_plugins/TF'):]
-    assert re.search(r'Enabled: (.*)', tf)[1] == 'false'
-    assert rviz.count('Shape: Axes') == 2
+def test_left_and_right_have_a_colour_each_and_their_names_in_every_viewer(layout):
+    lines = layout['configById']['Plot!height']['paths']
+    for chain, line in zip(
+        Configuration.checked(Catalog.load()).chains, lines, strict=True
+    ):
+        assert f'/{chain.tip}/' in line['value']
+        assert line['color'] == color_of(chain)
+        markers = skeleton_markers(chain, [0.0] * 6, Time(), '').markers
+        bones, name = markers[0], markers[2]
+        rgb = bytes.fromhex(line['color'][1:])
+        assert (bones.color.r, bones.color.g, bones.color.b) == tuple(
+            c / 255 for c in rgb
+        )
+        assert name.text == chain.tip
+
+
+def test_the_shipped_rviz_configuration_is_that_of_the_defaults():
+    shipped = yaml.safe_load((CONFIG / 'foot_poses.rviz').read_text())[
+        'Visualization Manager'
+    ]
+    assert shipped == rviz(Configuration.checked(Catalog.load()))
+
+
+def test_rviz_subscribes_best_effort_and_draws_the_axes_of_a_foot_once():
+    displays = rviz(Configuration.checked(Catalog.load()))['Displays']
+    topics = [display['Topic'] for display in displays if 'Topic' in display]
+    assert {topic['Value'] for topic in topics} == TOPICS
+    assert {topic['Reliability Policy'] for topic in topics} == {'Best Effort'}
+    assert [display['Enabled'] for display in displays if display['Name'] == 'TF'] == [
+        False
+    ]
+
+
+def test_rviz_shows_a_robot_of_any_size_in_its_namespace_and_frames():
+    catalog = Catalog.load(CONFIG / 'examples/panda.yaml')
+    configuration = Configuration.checked(catalog, chains=['panda'], frame_prefix='a/')
+    manager = rviz(configuration, '/lab/feet')
+    pose = manager['Displays'][-1]
+    assert (pose['Name'], pose['Topic']['Value']) == ('flange', '/lab/feet/flange/pose')
+    assert manager['Global Options']['Fixed Frame'] == 'a/panda_link0'
+    view = manager['Views']['Current']
+    assert 1.0 < view['Distance'] < 3.0  # m, for an arm of 1 m
+    assert view['Focal Point']['Z'] > 0.3
+    assert pose['Axes Length'] > 0.1 * view['Distance']

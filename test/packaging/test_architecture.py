@@ -22,12 +22,26 @@ MAY_IMPORT: dict[str, set[str]] = {
     'commands': {'kinematics', 'stream', 'tools'},
 }
 OF_KINEMATICS = {*sys.stdlib_module_names, 'numpy', 'yaml', 'lxml', 'icub_leg_fk'}
-OPTIONAL = ['argcomplete', 'matplotlib', 'mpl_toolkits', 'rich', 'rosbags', 'sympy', 'viser']
-ROS = ['rclpy', 'rcl_interfaces', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs',
-       'sensor_msgs', 'std_msgs', 'tf2_msgs', 'visualization_msgs']
-
-# To go when what it marks is as it should be.
-not_yet = pytest.mark.xfail(strict=True)
+OPTIONAL = [
+    'argcomplete',
+    'matplotlib',
+    'mpl_toolkits',
+    'rich',
+    'rosbags',
+    'sympy',
+    'viser',
+]
+ROS = [
+    'rclpy',
+    'rcl_interfaces',
+    'builtin_interfaces',
+    'diagnostic_msgs',
+    'geometry_msgs',
+    'sensor_msgs',
+    'std_msgs',
+    'tf2_msgs',
+    'visualization_msgs',
+]
 
 # Runs the program that follows as if the libraries named were not installed.
 WITHOUT = """
@@ -74,7 +88,12 @@ def libraries_of(tree: ast.AST) -> set[str]:
 def run_without(libraries: list[str], program: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, '-c', WITHOUT.format(libraries=libraries) + program],
-        cwd=PACKAGE.parent, capture_output=True, text=True, check=False, timeout=60)
+        cwd=PACKAGE.parent,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
 
 
 def test_the_package_has_its_rooms_and_no_other() -> None:
@@ -84,13 +103,16 @@ def test_the_package_has_its_rooms_and_no_other() -> None:
     assert at_the_top == {'__init__', '__main__', 'errors'}
 
 
-@pytest.mark.parametrize('room', [
-    'kinematics',
-    'stream',
-    'node',
-    'tools',
-    'commands',
-])
+@pytest.mark.parametrize(
+    'room',
+    [
+        'kinematics',
+        'stream',
+        'node',
+        'tools',
+        'commands',
+    ],
+)
 def test_a_room_imports_only_rooms_below(room: str) -> None:
     allowed = {room, 'errors', '__version__'} | MAY_IMPORT[room]
     for file in (PACKAGE / room).rglob('*.py'):
@@ -119,12 +141,16 @@ def test_no_two_modules_have_one_name() -> None:
     assert names.most_common(1)[0][1] == 1, names.most_common(3)
 
 
-@pytest.mark.parametrize(('node_too', 'libraries'), [
-    pytest.param(False, OPTIONAL + ROS, id='all but the node, without ROS'),
-    pytest.param(True, OPTIONAL, id='the node, with rclpy'),
-])
+@pytest.mark.parametrize(
+    ('node_too', 'libraries'),
+    [
+        pytest.param(False, OPTIONAL + ROS, id='all but the node, without ROS'),
+        pytest.param(True, OPTIONAL, id='the node, with rclpy'),
+    ],
+)
 def test_every_module_imports_without_optional_libraries(
-        node_too: bool, libraries: list[str]) -> None:
+    node_too: bool, libraries: list[str]
+) -> None:
     if node_too:
         pytest.importorskip('rclpy')
     files = [file for file in MODULES if (room_of(file) == 'node') == node_too]
@@ -144,10 +170,14 @@ def test_pose_needs_no_optional_library() -> None:
 def test_the_node_needs_no_optional_library_to_start() -> None:
     pytest.importorskip('rclpy')
     words = ['foot_pose_publisher', '--ros-args', '-p', 'version:=v9']
-    program = f'sys.argv = {words}; from icub_leg_fk.node.main import main; sys.exit(main())'
+    program = (
+        f'sys.argv = {words}; from icub_leg_fk.node.main import main; sys.exit(main())'
+    )
     done = run_without(OPTIONAL, program)
     assert done.returncode == 1
-    assert 'v2_5' in done.stderr  # it came as far as to list the versions that there are
+    assert (
+        'v2_5' in done.stderr
+    )  # it came as far as to list the versions that there are
 
 
 def functions_that_import(library: str) -> list[str]:
@@ -162,16 +192,19 @@ def functions_that_import(library: str) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize('library', [
-    'argcomplete',
-    'matplotlib',
-    'mpl_toolkits',
-    'rclpy',
-    'rich',
-    'rosbags',
-    pytest.param('sympy', marks=not_yet),
-    'viser',
-])
+@pytest.mark.parametrize(
+    'library',
+    [
+        'argcomplete',
+        'matplotlib',
+        'mpl_toolkits',
+        'rclpy',
+        'rich',
+        'rosbags',
+        'sympy',
+        'viser',
+    ],
+)
 def test_an_optional_library_is_imported_in_one_function(library: str) -> None:
     found = functions_that_import(library)
     assert len(found) <= 1, found

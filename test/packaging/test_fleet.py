@@ -11,16 +11,29 @@ SCRIPT = Path(__file__).resolve().parents[2] / 'docs' / 'fleet.py'
 
 
 def test_a_fleet_of_recordings_is_a_map_over_one_function(tmp_path):
-    distributed = pytest.importorskip('dask.distributed', reason='needs dask.distributed')
+    distributed = pytest.importorskip(
+        'dask.distributed', reason='needs dask.distributed'
+    )
     for number in range(3):
         write_bag(tmp_path / 'in' / f'walk{number}', joints=walk(20 + number))
     (tmp_path / 'in' / 'broken').mkdir()
     (tmp_path / 'in' / 'broken' / 'metadata.yaml').write_text('nothing')
-    with distributed.LocalCluster(n_workers=2, processes=True, threads_per_worker=1,
-                                  dashboard_address=None) as cluster:
+    with distributed.LocalCluster(
+        n_workers=2, processes=True, threads_per_worker=1, dashboard_address=None
+    ) as cluster:
         done = subprocess.run(
-            [sys.executable, SCRIPT, tmp_path / 'in', tmp_path / 'out', cluster.scheduler_address],
-            capture_output=True, text=True, timeout=120, check=False)
+            [
+                sys.executable,
+                SCRIPT,
+                tmp_path / 'in',
+                tmp_path / 'out',
+                cluster.scheduler_address,
+            ],
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
     assert done.returncode == 1, done.stderr
     assert done.stdout.count('Summary(') == 3
     assert 'broken: cannot be read' in done.stderr

@@ -21,8 +21,15 @@ COMMANDS = ('foot_pose_publisher', 'leg_fk')
 # What `colcon test` is tried on here; all of it would be this very run once more.
 COLCON_TESTS = 'test/kinematics/test_rotation.py'
 # Settings of this interpreter's own ROS, which another one must not inherit.
-FOREIGN = ('PYTHONPATH', 'LD_LIBRARY_PATH', 'AMENT_PREFIX_PATH', 'VIRTUAL_ENV',
-           '_ROS_WHEELS_BOOTSTRAP_COMPLETE', 'PYTEST_ADDOPTS', 'MAKEFLAGS')
+FOREIGN = (
+    'PYTHONPATH',
+    'LD_LIBRARY_PATH',
+    'AMENT_PREFIX_PATH',
+    'VIRTUAL_ENV',
+    '_ROS_WHEELS_BOOTSTRAP_COMPLETE',
+    'PYTEST_ADDOPTS',
+    'MAKEFLAGS',
+)
 # What a type checker that sees no types would not find, and one that does finds right.
 USER_SCRIPT = """\
 from icub_leg_fk import Chain, load_chain
@@ -39,24 +46,39 @@ leg.no_such_method  # type: ignore[attr-defined]
 """
 
 builds_the_package = pytest.mark.skipif(
-    'COLCON' in os.environ, reason='colcon is building and testing the package already')
+    'COLCON' in os.environ, reason='colcon is building and testing the package already'
+)
 
 
 def clean_environment() -> dict[str, str]:
     return {name: value for name, value in os.environ.items() if name not in FOREIGN}
 
 
-def run(*command: str | Path, cwd: Path, status: int = 0, env: Mapping[str, str] | None = None
-        ) -> subprocess.CompletedProcess[str]:
-    result = subprocess.run([str(word) for word in command], cwd=cwd, text=True, check=False,
-                            env=env or clean_environment(), capture_output=True)
+def run(
+    *command: str | Path,
+    cwd: Path,
+    status: int = 0,
+    env: Mapping[str, str] | None = None,
+) -> subprocess.CompletedProcess[str]:
+    result = subprocess.run(
+        [str(word) for word in command],
+        cwd=cwd,
+        text=True,
+        check=False,
+        env=env or clean_environment(),
+        capture_output=True,
+    )
     assert result.returncode == status, f'{command}\n{result.stdout}{result.stderr}'
     return result
 
 
 def files(root: Path, *folders: str) -> set[Path]:
-    return {path.relative_to(root) for folder in folders for path in (root / folder).rglob('*')
-            if path.is_file() and path.suffix != '.pyc'}
+    return {
+        path.relative_to(root)
+        for folder in folders
+        for path in (root / folder).rglob('*')
+        if path.is_file() and path.suffix != '.pyc'
+    }
 
 
 @pytest.fixture(scope='module')
@@ -89,8 +111,17 @@ def install_in_new_venv(folder: Path, *what: str) -> Path:
     [packages] = folder.glob('lib/*/site-packages')
     # Of a folder named in a .pth file no .pth files are read, and so not this run's own.
     (packages / 'of_this_run.pth').write_text(sysconfig.get_path('purelib'))
-    run(sys.executable, '-m', 'pip', '--python', folder / 'bin/python', 'install', '--no-deps',
-        *what, cwd=folder)
+    run(
+        sys.executable,
+        '-m',
+        'pip',
+        '--python',
+        folder / 'bin/python',
+        'install',
+        '--no-deps',
+        *what,
+        cwd=folder,
+    )
     return folder
 
 
@@ -116,7 +147,8 @@ def assert_shares(prefix: Path, clone: Path) -> None:
 
 @builds_the_package
 def test_pip_installs_the_commands_and_the_shared_files(
-        plain_venv: Path, clone: Path) -> None:
+    plain_venv: Path, clone: Path
+) -> None:
     for command in COMMANDS:
         assert os.access(plain_venv / 'bin' / command, os.X_OK)
     assert_shares(plain_venv, clone)
@@ -127,7 +159,8 @@ def test_pip_installs_the_commands_and_the_shared_files(
 
 @builds_the_package
 def test_the_commands_that_pip_installed_run_and_find_the_shipped_config(
-        plain_venv: Path, tmp_path: Path) -> None:
+    plain_venv: Path, tmp_path: Path
+) -> None:
     help_text = run(plain_venv / 'bin/foot_pose_publisher', '-h', cwd=tmp_path).stdout
     assert 'foot_pose_publisher' in help_text
     listing = run(plain_venv / 'bin/leg_fk', 'list', cwd=tmp_path).stdout
@@ -137,7 +170,8 @@ def test_the_commands_that_pip_installed_run_and_find_the_shipped_config(
 
 @builds_the_package
 def test_an_editable_install_has_the_commands_and_finds_the_config(
-        editable_venv: Path, clone: Path, tmp_path: Path) -> None:
+    editable_venv: Path, clone: Path, tmp_path: Path
+) -> None:
     listing = run(editable_venv / 'bin/leg_fk', 'list', cwd=tmp_path).stdout
     assert str(clone / 'config/icub_kinematics.yaml') in listing
     assert (editable_venv / 'bin/foot_pose_publisher').is_file()
@@ -145,20 +179,33 @@ def test_an_editable_install_has_the_commands_and_finds_the_config(
 
 @builds_the_package
 def test_an_editable_install_is_found_and_typed_in_the_parent_of_the_clone(
-        editable_venv: Path, clone: Path) -> None:
+    editable_venv: Path, clone: Path
+) -> None:
     pytest.importorskip('mypy')
     python = editable_venv / 'bin/python'
     script = clone.parent / 'walk.py'
     script.write_text(USER_SCRIPT)
     run(python, '-c', 'from icub_leg_fk import load_chain', cwd=clone.parent)
-    run(sys.executable, '-m', 'mypy', '--strict', '--python-executable', python, script,
-        cwd=clone.parent)
+    run(
+        sys.executable,
+        '-m',
+        'mypy',
+        '--strict',
+        '--python-executable',
+        python,
+        '--cache-dir',
+        ROOT / '.mypy_cache/of_a_user',
+        script,
+        cwd=clone.parent,
+    )
 
 
 @pytest.fixture(scope='module', params=[(), ('--symlink-install',)], ids=' '.join)
 def colcon_prefix(
-        request: pytest.FixtureRequest, known_files: set[Path],
-        tmp_path_factory: pytest.TempPathFactory) -> Path:
+    request: pytest.FixtureRequest,
+    known_files: set[Path],
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Path:
     """Return the install prefix of the package after `colcon build`, which has no complaint."""
     if shutil.which('colcon', path=colcon_environment()['PATH']) is None:
         pytest.skip('colcon is not installed')
@@ -175,43 +222,69 @@ def colcon_environment() -> dict[str, str]:
     return {**{k: v for k, v in os.environ.items() if k not in unwanted}, 'PATH': path}
 
 
-def colcon(workspace: Path, verb: str, *options: str) -> subprocess.CompletedProcess[str]:
+def colcon(
+    workspace: Path, verb: str, *options: str
+) -> subprocess.CompletedProcess[str]:
     return run('colcon', verb, *options, cwd=workspace, env=colcon_environment())
 
 
 @builds_the_package
 def test_colcon_puts_the_commands_where_ros2_run_looks(
-        colcon_prefix: Path, clone: Path) -> None:
+    colcon_prefix: Path, clone: Path
+) -> None:
     for command in COMMANDS:
         assert os.access(colcon_prefix / 'lib/icub_leg_fk' / command, os.X_OK)
     assert_shares(colcon_prefix, clone)
 
 
 @builds_the_package
-def test_leg_fk_finds_the_shipped_config_where_colcon_put_it(colcon_prefix: Path) -> None:
+def test_leg_fk_finds_the_shipped_config_where_colcon_put_it(
+    colcon_prefix: Path,
+) -> None:
     script = f'source {colcon_prefix.parent}/setup.bash && lib/icub_leg_fk/leg_fk list'
-    listing = run('bash', '-c', script, cwd=colcon_prefix, env=colcon_environment()).stdout
+    listing = run(
+        'bash', '-c', script, cwd=colcon_prefix, env=colcon_environment()
+    ).stdout
     tables = colcon_prefix / TABLES
     shown = tables.readlink() if tables.is_symlink() else tables
     assert str(shown) in listing
 
 
 @builds_the_package
-@pytest.mark.parametrize('colcon_prefix', [('--symlink-install',)], indirect=True, ids=' '.join)
+@pytest.mark.parametrize(
+    'colcon_prefix', [('--symlink-install',)], indirect=True, ids=' '.join
+)
 def test_colcon_test_runs_the_tests(colcon_prefix: Path) -> None:
     workspace = colcon_prefix.parents[1]
-    colcon(workspace, 'test', '--return-code-on-test-failure', '--pytest-args', COLCON_TESTS)
+    colcon(
+        workspace,
+        'test',
+        '--return-code-on-test-failure',
+        '--pytest-args',
+        COLCON_TESTS,
+    )
     colcon(workspace, 'test-result', '--all')
-    report = ElementTree.parse(workspace / 'build/icub_leg_fk/pytest.xml').find('testsuite')
+    report = ElementTree.parse(workspace / 'build/icub_leg_fk/pytest.xml').find(
+        'testsuite'
+    )
     assert report is not None
     assert int(report.attrib['tests']) > int(report.attrib['skipped'])
 
 
 @builds_the_package
 def test_the_source_distribution_has_the_files_that_git_knows(
-        known_files: set[Path], tmp_path: Path) -> None:
+    known_files: set[Path], tmp_path: Path
+) -> None:
     clone = copy(known_files, tmp_path / 'clone')
-    made = run(sys.executable, 'setup.py', '--quiet', 'sdist', '--dist-dir', tmp_path, cwd=clone)
+    made = run(
+        sys.executable,
+        'setup.py',
+        '--quiet',
+        'sdist',
+        '--dist-dir',
+        tmp_path,
+        cwd=clone,
+    )
     assert made.stderr == ''
     [archive] = tmp_path.glob('*.tar.gz')
     with tarfile.open(archive) as packed:
@@ -221,14 +294,32 @@ def test_the_source_distribution_has_the_files_that_git_knows(
 
 def test_package_xml_is_valid_and_says_what_setup_py_says() -> None:
     catkin_pkg = pytest.importorskip('catkin_pkg.package')
-    package = catkin_pkg.parse_package(ROOT / 'package.xml')  # checks the e-mail address too
+    package = catkin_pkg.parse_package(
+        ROOT / 'package.xml'
+    )  # checks the e-mail address too
     about = [
-        line.strip() for line in run(
-            sys.executable, 'setup.py', '--quiet', '--name', '--version', '--license',
-            '--maintainer', '--maintainer-email', cwd=ROOT, env=os.environ).stdout.splitlines()]
+        line.strip()
+        for line in run(
+            sys.executable,
+            'setup.py',
+            '--quiet',
+            '--name',
+            '--version',
+            '--license',
+            '--maintainer',
+            '--maintainer-email',
+            cwd=ROOT,
+            env=os.environ,
+        ).stdout.splitlines()
+    ]
     [maintainer] = package.maintainers
-    assert about == [package.name, package.version, package.licenses[0],
-                     maintainer.name, maintainer.email]
+    assert about == [
+        package.name,
+        package.version,
+        package.licenses[0],
+        maintainer.name,
+        maintainer.email,
+    ]
     assert package.version == icub_leg_fk.__version__
     assert package.get_build_type() == 'ament_python'
 

@@ -1,5 +1,6 @@
 """What README and documentation show is what happens."""
 
+import ast
 import os
 from pathlib import Path
 import re
@@ -8,14 +9,26 @@ import subprocess
 import sys
 
 from icub_leg_fk import __main__ as leg_fk
+from icub_leg_fk.kinematics import Catalog
 import pytest
 import yaml
 
 ROOT = Path(__file__).parents[2]
-README = (ROOT / 'README.md').read_text()
-PAGES = {path.name: path.read_text() for path in (
-    ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', ROOT / 'QUALITY_DECLARATION.md',
-    *sorted((ROOT / 'docs').glob('*.md')))}
+PAGES = {
+    path.name: path.read_text()
+    for path in (
+        ROOT / 'README.md',
+        ROOT / 'CONTRIBUTING.md',
+        ROOT / 'QUALITY_DECLARATION.md',
+        ROOT / 'docs/index.rst',
+        *sorted((ROOT / 'docs').glob('*.md')),
+    )
+}
+README = PAGES['README.md']
+LEG_FK = re.compile(
+    r'(?:ros2 run icub_leg_fk |.*python -m icub_)?leg_fk (.*?)(?: > .*)?$'
+)
+NEEDS_ROS = re.compile(r'.*\bros2 |rosdep |colcon |\. install|python3 -m venv|~/')
 
 
 def blocks(text: str, kind: str) -> list[str]:
@@ -23,21 +36,36 @@ def blocks(text: str, kind: str) -> list[str]:
 
 
 def commands(text: str) -> list[str]:
-    """Return the lines of the console blocks, without their prompt."""
-    return [line[2:].partition('     #')[0].strip() for block in blocks(text, 'console')
-            for line in block.splitlines() if line.startswith('$ ')]
+    """Return the lines that have a prompt, without it."""
+    return re.findall(r'^ *\$ (.+)$', text, re.MULTILINE)
 
 
 def test_the_readme_can_be_read_in_ten_minutes():
     assert len(README.split()) <= 1000
 
 
-EXPLANATIONS = [block for text in PAGES.values() for block in blocks(text, 'text')
-                if block.startswith('$ leg_fk explain')]
+@pytest.mark.parametrize('page', PAGES)
+def test_no_line_of_code_is_cut_off(page):
+    for block in blocks(PAGES[page], '[a-z]+'):
+        assert max(map(len, block.splitlines())) <= 115
 
 
-@pytest.mark.parametrize('block', EXPLANATIONS)
-def test_every_line_of_an_explanation_is_printed_in_this_order(block, capsys, monkeypatch):
+def test_the_front_page_shows_commands_of_the_readme():
+    shown = commands(PAGES['index.rst'])
+    assert shown
+    assert set(shown) <= set(commands(README))
+
+
+ANSWERS = [
+    block
+    for text in PAGES.values()
+    for block in blocks(text, 'text')
+    if block.startswith('$ leg_fk')
+]
+
+
+@pytest.mark.parametrize('block', ANSWERS)
+def test_every_line_of_an_answer_is_printed_in_this_order(block, capsys, monkeypatch):
     monkeypatch.chdir(ROOT)
     command, *shown = block.splitlines()
     assert leg_fk.main(shlex.split(command)[2:]) == 0
@@ -47,43 +75,86 @@ def test_every_line_of_an_explanation_is_printed_in_this_order(block, capsys, mo
             assert line in printed
 
 
-def test_explanations_are_shown():
-    assert len(EXPLANATIONS) == 2
+def test_answers_are_shown():
+    assert len(ANSWERS) == 3
 
 
 @pytest.mark.parametrize('page', ['README.md', 'api.md'])
-def test_the_library_example_runs(page):
-    (block,) = blocks(PAGES[page], 'python')
+def test_the_library_examples_run(page):
+    example, *others = blocks(PAGES[page], 'python')
     names = {}
-    exec(block, names)
-    assert names['T_root_sole'][:3, 3].tolist() == pytest.approx(list(names['leg'].pose(
-        names['q'])[:3]))
+    exec(example, names)
+    assert names['T_root_sole'][:3, 3].tolist() == pytest.approx(
+        list(names['leg'].pose(names['q'])[:3])
+    )
     assert names['J'].shape == (6, 6)
     assert names['poses'].shape == (1000, 7)
+    for other in others:
+        exec(other, {})
 
 
-def test_the_kinematics_file_shown_is_the_shipped_example():
-    (block,) = blocks(PAGES['kinematics_file.md'], 'yaml')
-    assert block.rstrip() == (ROOT / 'config/examples/ur5.yaml').read_text().rstrip()
+def test_the_kinematics_files_shown_can_be_read_and_one_is_the_shipped_example(
+    tmp_path,
+):
+    shown = blocks(PAGES['kinematics_file.md'], 'yaml')
+    assert shown[0].rstrip() == (ROOT / 'config/examples/ur5.yaml').read_text().rstrip()
+    for block in shown:
+        file = tmp_path / 'shown.yaml'
+        file.write_text(block)
+        assert not Catalog.load(file).warnings
 
 
 @pytest.mark.parametrize('page', PAGES)
 def test_every_command_has_arguments_that_are_known(page):
     """They are parsed, not run; `ros2 run` in front of them makes no difference."""
     for command in commands(PAGES[page]):
-        words = shlex.split(command)
-        if 'leg_fk' in words[:4]:
-            words = words[words.index('leg_fk') + 1:]
-            leg_fk.parse(words)
+        found = LEG_FK.match(command)
+        if found:
+            leg_fk.parse(shlex.split(found[1]))
+
+
+def texts(module: Path) -> list[str]:
+    """Return the texts in a module, docstrings apart; of an f-string its fixed parts."""
+    nodes = list(ast.walk(ast.parse(module.read_text())))
+    docstrings = [node.value for node in nodes if isinstance(node, ast.Expr)]
+    constants = [node for node in nodes if isinstance(node, ast.Constant)]
+    return [
+        node.value
+        for node in constants
+        if isinstance(node.value, str) and node not in docstrings
+    ]
+
+
+def test_every_message_explained_is_one_of_the_code():
+    code = '\n'.join(
+        text
+        for module in (ROOT / 'icub_leg_fk').rglob('*.py')
+        for text in texts(module)
+    )
+    messages = re.findall(r'^\| (.*?) \| ', PAGES['no_poses.md'], re.MULTILINE)
+    assert len(messages) > 50
+    for message in re.findall('`(.*?)`', '\n'.join(messages)):
+        for part in message.split('…'):
+            assert part.strip() in code, message
+
+
+@pytest.mark.parametrize('module', ['stream/notes.py', 'node/health.py'])
+def test_every_message_on_the_input_is_explained(module):
+    for text in texts(ROOT / 'icub_leg_fk' / module):
+        for part in re.split(r'\{.*?\}', text):
+            if len(part) > 12 and ' ' in part.strip():
+                assert part.strip() in PAGES['no_poses.md']
 
 
 def parameters() -> dict[str, object]:
-    (section,) = yaml.safe_load((ROOT / 'config/foot_pose_publisher.yaml').read_text()).values()
+    (section,) = yaml.safe_load(
+        (ROOT / 'config/foot_pose_publisher.yaml').read_text()
+    ).values()
     return section['ros__parameters']
 
 
 @pytest.mark.parametrize('page', ['README.md', 'node.md'])
-@pytest.mark.parametrize('name', [name for name in parameters() if not name.endswith('.version')])
+@pytest.mark.parametrize('name', parameters())
 def test_the_tables_of_parameters_are_those_of_the_shipped_file(page, name):
     rows = re.findall(r'^\| (`[^|]*`) \| `([^`]*)` \|', PAGES[page], re.MULTILINE)
     [default] = [default for names, default in rows if f'`{name}`' in names.split(', ')]
@@ -99,30 +170,72 @@ def test_links_and_pictures_lead_somewhere(page):
         file, _, anchor = target.partition('#')
         assert not file or (folder / file).is_file(), target
         text = (folder / file).read_text() if file.endswith('.md') else PAGES[page]
-        anchors = {re.sub(r'[^a-z0-9 _-]', '', line.lstrip('# ').lower()).replace(' ', '-')
-                   for line in text.splitlines() if line.startswith('#')}
+        anchors = {
+            re.sub(r'[^a-z0-9 _-]', '', line.lstrip('# ').lower()).replace(' ', '-')
+            for line in text.splitlines()
+            if line.startswith('#')
+        }
         assert not anchor or anchor in anchors, target
 
 
-@pytest.mark.skipif('README_BLOCKS' not in os.environ,
-                    reason='sets up a fresh environment, for minutes: make readme')
-def test_every_block_of_the_readme_works_in_order_in_a_fresh_clone(tmp_path):
-    """As somebody without ROS follows it; what needs ros2 or colcon is told and passed over."""
-    subprocess.run(['git', 'clone', '--quiet', ROOT, tmp_path / 'clone'], check=True)
-    script, passed_over = ['set -ex'], []
-    for command in commands(README):
-        if shlex.split(command)[0] in ('ros2', 'rosdep', 'colcon') or 'install/setup' in command:
-            passed_over.append(command)
-        else:
-            script.append(command)
-    (example,) = blocks(README, 'python')
-    (tmp_path / 'clone' / 'example.py').write_text(example)
-    script.append('python example.py')
-    print('passed over:', *passed_over, sep='\n  ')
-    environment = {name: value for name, value in os.environ.items()
-                   if name in ('PATH', 'HOME', 'LANG', 'ROS_DOMAIN_ID') or name.startswith('PIP_')}
-    done = subprocess.run(['bash', '-c', '\n'.join(script)], cwd=tmp_path / 'clone',
-                          env=environment, stdout=sys.stdout, stderr=sys.stderr, check=False)
-    assert done.returncode == 0
-    made = {path.name for path in (tmp_path / 'clone').iterdir()}
-    assert {'walk', 'walk_with_poses', 'feet.png', 'robot.urdf', 'my_robot.yaml'} <= made
+RUNS_UNTIL_CTRL_C = ('foot_pose_publisher', 'leg_fk view')
+
+
+def script(page: str) -> str:
+    """Return what somebody without ROS types who follows a page; the rest is told."""
+    lines = ['set -ex', '. .venv/bin/activate']
+    kinds = re.findall(
+        r'^```(console|python)\n(.*?)^```', PAGES[page], re.DOTALL | re.MULTILINE
+    )
+    for kind, block in kinds:
+        if kind == 'python':
+            lines.append(f"python - <<'END'\n{block}END")
+            continue
+        for command in commands(block):
+            if NEEDS_ROS.match(command):
+                print('passed over:', command)
+            elif command.startswith(RUNS_UNTIL_CTRL_C):
+                lines.append(f'timeout --preserve-status --signal=INT 5 {command}')
+            else:
+                lines.append(command)
+    return '\n'.join(lines)
+
+
+@pytest.fixture(scope='module')
+def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a clone in which only `make demo` was typed."""
+    folder = tmp_path_factory.mktemp('clone')
+    subprocess.run(['git', 'clone', '--quiet', ROOT, folder], check=True)
+    type_in(folder, 'make demo')
+    return folder
+
+
+def type_in(folder: Path, lines: str) -> None:
+    """Run lines of a shell that knows nothing of this run's environment."""
+    environment = {
+        name: value
+        for name, value in os.environ.items()
+        if name
+        in ('PATH', 'HOME', 'LANG', 'ROS_DOMAIN_ID', 'ROS_AUTOMATIC_DISCOVERY_RANGE')
+        or name.startswith('PIP_')
+    }
+    subprocess.run(
+        ['bash', '-c', lines],
+        cwd=folder,
+        env=environment,
+        stdout=sys.stdout,
+        stderr=sys.stderr,
+        check=True,
+    )
+
+
+@pytest.mark.skipif(
+    'README_BLOCKS' not in os.environ,
+    reason='sets up a fresh environment, for minutes: make readme',
+)
+@pytest.mark.parametrize(
+    'page', [page for page, text in PAGES.items() if blocks(text, 'console')]
+)
+def test_every_block_works_in_order_in_a_fresh_clone(page, clone):
+    subprocess.run(['git', 'clean', '-xfdq', '--exclude=.venv'], cwd=clone, check=True)
+    type_in(clone, script(page))

@@ -19,12 +19,26 @@ from support.joint_trial import bits, decode_joint_state
 TEXT = st.text(max_size=30)  # every character but lone surrogates, NUL included
 DOUBLES = st.lists(st.floats(), max_size=6).map(tuple)
 MESSAGES = st.builds(
-    Message, st.integers(-2**31, 2**31 - 1), st.integers(0, 2**32 - 1),
+    Message,
+    st.integers(-(2**31), 2**31 - 1),
+    st.integers(0, 2**32 - 1),
     st.lists(TEXT.filter(lambda text: '\x00' not in text), max_size=6).map(tuple),
-    DOUBLES, DOUBLES, DOUBLES, TEXT.filter(lambda text: '\x00' not in text),
-    st.sampled_from('<>'), st.sampled_from((0, 1, 4, 9)), st.sampled_from((0, 1, 255)))
-LARGE = Message(7, 8, tuple(f'joint_{i}' for i in range(2000)), tuple(map(float, range(2000))),
-                tuple(map(float, range(1999))), (math.nan,) * 3)
+    DOUBLES,
+    DOUBLES,
+    DOUBLES,
+    TEXT.filter(lambda text: '\x00' not in text),
+    st.sampled_from('<>'),
+    st.sampled_from((0, 1, 4, 9)),
+    st.sampled_from((0, 1, 255)),
+)
+LARGE = Message(
+    7,
+    8,
+    tuple(f'joint_{i}' for i in range(2000)),
+    tuple(map(float, range(2000))),
+    tuple(map(float, range(1999))),
+    (math.nan,) * 3,
+)
 GOOD = Message(1, 2, ('a', '', 'längs'), (1.0, 2.0, 3.0), (4.0,), (5.0, 6.0), 'base')
 
 
@@ -37,22 +51,36 @@ def fields(data):
 
 
 def meant(message):
-    return (message.sec, message.nanosec, message.frame_id, message.names,
-            bits(message.positions), bits(message.velocities))
+    return (
+        message.sec,
+        message.nanosec,
+        message.frame_id,
+        message.names,
+        bits(message.positions),
+        bits(message.velocities),
+    )
 
 
 def fields_of(ros):
     """Return the same of a message object of rclpy or rosbags."""
     header = ros.header
-    return (header.stamp.sec, header.stamp.nanosec, header.frame_id, tuple(ros.name),
-            bits(ros.position), bits(ros.velocity))
+    return (
+        header.stamp.sec,
+        header.stamp.nanosec,
+        header.frame_id,
+        tuple(ros.name),
+        bits(ros.position),
+        bits(ros.velocity),
+    )
 
 
 @pytest.fixture(scope='module')
 def rclpy_reads():
     """Return what reads bytes as rclpy does; None if it refuses them."""
     serialization = pytest.importorskip('rclpy.serialization', reason='needs rclpy')
-    joint_state = pytest.importorskip('sensor_msgs.msg', reason='needs sensor_msgs').JointState
+    joint_state = pytest.importorskip(
+        'sensor_msgs.msg', reason='needs sensor_msgs'
+    ).JointState
 
     def read(data):
         try:
@@ -60,6 +88,7 @@ def rclpy_reads():
         except Exception as error:  # noqa: BLE001 (RMWError is no public name)
             assert 'failed to deserialize' in str(error)
             return None
+
     return read
 
 
@@ -76,9 +105,15 @@ def test_reads_what_rclpy_reads(rclpy_reads, message):
 @example(LARGE)
 def test_reads_what_rclpy_writes(message):
     serialization = pytest.importorskip('rclpy.serialization', reason='needs rclpy')
-    joint_state = pytest.importorskip('sensor_msgs.msg', reason='needs sensor_msgs').JointState
-    ros = joint_state(name=message.names, position=message.positions,
-                      velocity=message.velocities, effort=message.efforts)
+    joint_state = pytest.importorskip(
+        'sensor_msgs.msg', reason='needs sensor_msgs'
+    ).JointState
+    ros = joint_state(
+        name=message.names,
+        position=message.positions,
+        velocity=message.velocities,
+        effort=message.efforts,
+    )
     ros.header.stamp.sec, ros.header.stamp.nanosec = message.sec, message.nanosec
     ros.header.frame_id = message.frame_id
     assert fields(serialization.serialize_message(ros)) == meant(message)
@@ -99,18 +134,28 @@ def test_refuses_the_other_byte_order_than_it_says():
             decode_joint_state(lie + data[2:])
 
 
-@pytest.mark.parametrize('kind', [2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 0x100, 0x101, 0xffff])
+@pytest.mark.parametrize('kind', [2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 0x100, 0x101, 0xFFFF])
 def test_refuses_every_encapsulation_but_plain_cdr(kind):
-    with pytest.raises(MalformedMessageError, match=f'encapsulation 0x{kind:04x}; allowed'):
+    with pytest.raises(
+        MalformedMessageError, match=f'encapsulation 0x{kind:04x}; allowed'
+    ):
         decode_joint_state(struct.pack('>H', kind) + GOOD.cdr()[2:])
 
 
-@pytest.mark.parametrize(('old', 'new'), [
-    (b'base\x00', b'base!'), (b'base\x00', b'b\x00se\x00'), (b'base\x00', b'bas\x00\x00')])
+@pytest.mark.parametrize(
+    ('old', 'new'),
+    [
+        (b'base\x00', b'base!'),
+        (b'base\x00', b'b\x00se\x00'),
+        (b'base\x00', b'bas\x00\x00'),
+    ],
+)
 def test_refuses_a_string_without_nul_at_its_end_or_with_one_before(old, new):
     data = GOOD.cdr()
     assert old in data
-    with pytest.raises(MalformedMessageError, match=r'header\.frame_id is not a string'):
+    with pytest.raises(
+        MalformedMessageError, match=r'header\.frame_id is not a string'
+    ):
         decode_joint_state(data.replace(old, new))
 
 
@@ -133,11 +178,15 @@ def test_an_absurd_count_is_refused_without_allocating(order, count):
     message = Message(**{**vars(GOOD), 'order': order})
     data = message.cdr()
     positions_at = data.index(struct.pack(f'{order}3d', *GOOD.positions))
-    counts_at = {'header.frame_id': 12, 'name': 24, 'velocity': positions_at + 24,
-                 'position': data.rindex(struct.pack(order + 'I', 3), 0, positions_at),
-                 'effort': positions_at + 40}
+    counts_at = {
+        'header.frame_id': 12,
+        'name': 24,
+        'velocity': positions_at + 24,
+        'position': data.rindex(struct.pack(order + 'I', 3), 0, positions_at),
+        'effort': positions_at + 40,
+    }
     for field, at in counts_at.items():
-        spoilt = data[:at] + struct.pack(order + 'I', count) + data[at + 4:]
+        spoilt = data[:at] + struct.pack(order + 'I', count) + data[at + 4 :]
         tracemalloc.start()
         with pytest.raises(MalformedMessageError, match=f'{field} has {count} items'):
             decode_joint_state(spoilt)
@@ -146,16 +195,26 @@ def test_an_absurd_count_is_refused_without_allocating(order, count):
         assert peak < 20_000
 
 
-SOUND = [GOOD.cdr(), Message(**{**vars(GOOD), 'order': '>'}).cdr(),
-         Message(3, 4, ('lift', 'turn'), (0.1, 0.2)).cdr()]
+SOUND = [
+    GOOD.cdr(),
+    Message(**{**vars(GOOD), 'order': '>'}).cdr(),
+    Message(3, 4, ('lift', 'turn'), (0.1, 0.2)).cdr(),
+]
 LONGEST = max(map(len, SOUND))
-SPOILS = st.lists(st.tuples(st.integers(0, LONGEST), st.one_of(
-    st.sampled_from((0, 1, 2, 4, 8, 0xff)), st.integers(0, 255))), max_size=3)
+SPOILS = st.lists(
+    st.tuples(
+        st.integers(0, LONGEST),
+        st.one_of(st.sampled_from((0, 1, 2, 4, 8, 0xFF)), st.integers(0, 255)),
+    ),
+    max_size=3,
+)
 
 
 @settings(max_examples=1000)
 @given(st.sampled_from(SOUND), SPOILS, st.one_of(st.none(), st.integers(0, LONGEST)))
-def test_spoilt_bytes_are_read_as_rclpy_reads_them_or_refused(rclpy_reads, sound, spoils, end):
+def test_spoilt_bytes_are_read_as_rclpy_reads_them_or_refused(
+    rclpy_reads, sound, spoils, end
+):
     """Whatever passes here passes there, with the same content; what does not is on the list.
 
     But for the options in the encapsulation, which Kilted's Fast CDR looks at.
@@ -167,16 +226,19 @@ def test_spoilt_bytes_are_read_as_rclpy_reads_them_or_refused(rclpy_reads, sound
     data = bytes(spoilt[:end])
     ours, theirs = fields(data), rclpy_reads(data)
     if ours is None and theirs is not None:
-        with pytest.raises(MalformedMessageError,
-                           match=r'the encapsulation|is not a string that ends'):
+        with pytest.raises(
+            MalformedMessageError, match=r'the encapsulation|is not a string that ends'
+        ):
             decode_joint_state(data)
     else:
         assert ours == theirs
 
 
-STAMPS = st.tuples(st.integers(-2**31, 2**31 - 1), st.integers(0, 2**32 - 1))
-FRAME_IDS = st.one_of(st.sampled_from(('', 'root_link', 'Fußgelenk/\U0001f9be', 'x' * 5000)),
-                      TEXT.filter(lambda text: '\x00' not in text))
+STAMPS = st.tuples(st.integers(-(2**31), 2**31 - 1), st.integers(0, 2**32 - 1))
+FRAME_IDS = st.one_of(
+    st.sampled_from(('', 'root_link', 'Fußgelenk/\U0001f9be', 'x' * 5000)),
+    TEXT.filter(lambda text: '\x00' not in text),
+)
 POSES = st.tuples(*[st.floats()] * 7)
 
 
@@ -190,14 +252,32 @@ def rosbags_reads():
         message = store.deserialize_cdr(data, kind)
         assert data == store.serialize_cdr(message, kind)
         return message
+
     return read
 
 
 def numbers_of(pose):
     """Return the numbers of a Pose, a Transform or a Twist."""
-    parts = [getattr(pose, name) for name in ('position', 'translation', 'linear', 'orientation',
-                                              'rotation', 'angular') if hasattr(pose, name)]
-    return bits([getattr(part, axis) for part in parts for axis in 'xyzw' if hasattr(part, axis)])
+    parts = [
+        getattr(pose, name)
+        for name in (
+            'position',
+            'translation',
+            'linear',
+            'orientation',
+            'rotation',
+            'angular',
+        )
+        if hasattr(pose, name)
+    ]
+    return bits(
+        [
+            getattr(part, axis)
+            for part in parts
+            for axis in 'xyzw'
+            if hasattr(part, axis)
+        ]
+    )
 
 
 @given(FRAME_IDS, STAMPS, POSES)
@@ -223,15 +303,20 @@ def test_rosbags_reads_the_transforms_that_were_meant(rosbags_reads, transforms,
     encoder = TFMessageEncoder([(parent, child) for parent, child, _ in transforms])
     data = encoder.encode(*stamp, [pose for _, _, pose in transforms])
     message = rosbags_reads(data, 'tf2_msgs/msg/TFMessage')
-    assert [(t.header.frame_id, t.child_frame_id, numbers_of(t.transform))
-            for t in message.transforms] == [
-                (parent, child, bits(pose)) for parent, child, pose in transforms]
-    assert {(t.header.stamp.sec, t.header.stamp.nanosec) for t in message.transforms} <= {stamp}
+    assert [
+        (t.header.frame_id, t.child_frame_id, numbers_of(t.transform))
+        for t in message.transforms
+    ] == [(parent, child, bits(pose)) for parent, child, pose in transforms]
+    assert {
+        (t.header.stamp.sec, t.header.stamp.nanosec) for t in message.transforms
+    } <= {stamp}
 
 
 @given(FRAME_IDS, STAMPS, POSES)
 def test_a_pose_is_the_bytes_that_rclpy_writes(frame_id, stamp, pose):
-    serialize = pytest.importorskip('rclpy.serialization', reason='needs rclpy').serialize_message
+    serialize = pytest.importorskip(
+        'rclpy.serialization', reason='needs rclpy'
+    ).serialize_message
     messages = pytest.importorskip('geometry_msgs.msg', reason='needs geometry_msgs')
     message = messages.PoseStamped()
     message.header.frame_id = frame_id
@@ -241,4 +326,7 @@ def test_a_pose_is_the_bytes_that_rclpy_writes(frame_id, stamp, pose):
     ours, theirs = PoseStampedEncoder(frame_id).encode(*stamp, pose), serialize(message)
     # Between the frame id and the numbers, and behind them, rclpy's buffer may hold anything.
     end = 4 + 8 + 4 + len(frame_id.encode()) + 1
-    assert (ours[:end], ours[-56:]) == (theirs[:end], theirs[len(ours) - 56:len(ours)])
+    assert (ours[:end], ours[-56:]) == (
+        theirs[:end],
+        theirs[len(ours) - 56 : len(ours)],
+    )

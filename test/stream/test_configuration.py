@@ -1,9 +1,12 @@
 """What a set of values gives, or why it is refused; the node and `leg_fk bag` take the same."""
 
+import re
+
 from icub_leg_fk.errors import ParameterError
-from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.kinematics import Catalog, Urdf
 from icub_leg_fk.stream.configuration import Configuration
 import pytest
+from support.described_robots import own_description
 
 ARMS = """
 units: {length: m, angle: rad}
@@ -40,27 +43,39 @@ def arms(tmp_path_factory):
 
 def frames(configuration):
     """Return each chain with its version, and the frame of its poses."""
-    return {f'{chain.name}={chain.version}': chain.frame_id for chain in configuration.chains}
+    return {
+        f'{chain.name}={chain.version}': chain.frame_id
+        for chain in configuration.chains
+    }
 
 
 def test_the_defaults_are_both_legs_in_the_axes_of_the_table(shipped):
     configuration = Configuration.checked(shipped)
     assert frames(configuration) == {
-        'left_leg=v2_5': 'l_foot_dh_frame', 'right_leg=v2_5': 'r_foot_dh_frame'}
+        'left_leg=v2_5': 'l_foot_dh_frame',
+        'right_leg=v2_5': 'r_foot_dh_frame',
+    }
     assert (configuration.notes, configuration.warnings) == ((), ())
     assert (configuration.frame_prefix, configuration.joint_timeout) == ('', 0.5)
     assert not configuration.stamp_now
-    assert not (configuration.publish_tf or configuration.publish_twist
-                or configuration.publish_markers)
+    assert not (
+        configuration.publish_tf
+        or configuration.publish_twist
+        or configuration.publish_markers
+    )
 
 
-@pytest.mark.parametrize(('chains', 'version', 'expected'), [
-    (['left_leg', 'right_leg'], 'v1', ['left_leg=v1', 'right_leg=v1']),
-    (['left_leg=v1', 'right_leg'], '', ['left_leg=v1', 'right_leg=v2_5']),
-    (['right_leg=v2_5', 'left_leg'], 'v1', ['right_leg=v2_5', 'left_leg=v1']),
-    (['left_leg', 'head_imu=v2'], 'v1', ['left_leg=v1', 'head_imu=v2']),
-    (['left_leg', 'head_imu'], '', ['left_leg=v2_5', 'head_imu=v2']),
-], ids=str)
+@pytest.mark.parametrize(
+    ('chains', 'version', 'expected'),
+    [
+        (['left_leg', 'right_leg'], 'v1', ['left_leg=v1', 'right_leg=v1']),
+        (['left_leg=v1', 'right_leg'], '', ['left_leg=v1', 'right_leg=v2_5']),
+        (['right_leg=v2_5', 'left_leg'], 'v1', ['right_leg=v2_5', 'left_leg=v1']),
+        (['left_leg', 'head_imu=v2'], 'v1', ['left_leg=v1', 'head_imu=v2']),
+        (['left_leg', 'head_imu'], '', ['left_leg=v2_5', 'head_imu=v2']),
+    ],
+    ids=str,
+)
 def test_a_version_is_of_all_chains_or_of_one(shipped, chains, version, expected):
     configuration = Configuration.checked(shipped, chains=chains, version=version)
     assert list(frames(configuration)) == expected
@@ -76,10 +91,18 @@ def test_the_frame_is_one_of_the_tip(shipped, arms):
 
 def test_a_chain_with_one_frame_gives_that_and_says_so(shipped, arms):
     configuration = Configuration.checked(
-        shipped, chains=['left_leg', 'head_imu'], foot_frame='sole', frame_prefix='icub1/')
-    assert frames(configuration) == {'left_leg=v2_5': 'l_sole', 'head_imu=v2': 'imu_frame'}
-    assert configuration.notes == ('head_imu has no sole frame; its pose is that of '
-                                   'icub1/imu_frame',)
+        shipped,
+        chains=['left_leg', 'head_imu'],
+        foot_frame='sole',
+        frame_prefix='icub1/',
+    )
+    assert frames(configuration) == {
+        'left_leg=v2_5': 'l_sole',
+        'head_imu=v2': 'imu_frame',
+    }
+    assert configuration.notes == (
+        'head_imu has no sole frame; its pose is that of icub1/imu_frame',
+    )
     configuration = Configuration.checked(arms, chains=['crane'], foot_frame='tool')
     assert frames(configuration) == {'crane=b': 'crane_hook'}
 
@@ -89,41 +112,124 @@ def test_without_a_choice_the_first_frame_counts_which_is_said(arms):
     assert frames(configuration) == {'arm=b': 'arm_flange', 'crane=a': 'crane_hook'}
     assert configuration.notes == (
         'arm has no dh frame; its pose is that of arm_flange',
-        'crane has no dh frame; its pose is that of crane_hook')
+        'crane has no dh frame; its pose is that of crane_hook',
+    )
 
 
-@pytest.mark.parametrize(('values', 'refused'), [
-    ({'version': 'v9'}, "version: unknown version of chain left_leg 'v9'; known: v1, v2_5, v3"),
-    ({'version': 'V1'}, 'version: unknown version of chain left_leg'),
-    ({'chains': ['left_leg', 'head_imu'], 'version': 'v1'}, 'as in head_imu=v'),
-    ({'chains': ['left_leg=v7']}, "chains: unknown version of chain left_leg 'v7'"),
-    ({'chains': ['lef_leg']}, "chains: unknown chain 'lef_leg'; did you mean 'left_leg'?"),
-    ({'chains': []}, 'chains: no chain is named; allowed: one or more of left_leg, right_leg'),
-    ({'chains': ['left_leg', 'left_leg=v1']}, 'chains: chain left_leg is named twice'),
-    ({'chains': ['left_leg=v3', 'right_leg']}, 'chains: left_leg=v3 and right_leg=v2_5 do not go'),
-    ({'foot_frame': 'toe'}, "foot_frame: found 'toe', allowed: dh or sole"),
-    ({'frame_prefix': 'a b'}, "frame_prefix: found 'a b', allowed: printable"),
-    ({'frame_prefix': '/icub1/'}, "frame_prefix: found '/icub1/', allowed: .* no leading slash"),
-    ({'joint_timeout': -0.1}, 'joint_timeout: found -0.1, allowed: 0 to 1e'),
-    ({'joint_timeout': 1.1e6}, 'joint_timeout: found 1100000.0'),
-    ({'joint_timeout': float('nan')}, 'joint_timeout: found nan'),
-    ({'joint_timeout': float('inf')}, 'joint_timeout: found inf'),
-    ({'stamp_source': 'later'}, "stamp_source: found 'later', allowed: message or now"),
-], ids=str)
-def test_a_value_that_cannot_be_used_is_refused_with_the_choices(shipped, values, refused):
+@pytest.mark.parametrize(
+    ('values', 'refused'),
+    [
+        (
+            {'version': 'v9'},
+            "version: unknown version 'v9' of chain left_leg; known: v1, v2_5, v3",
+        ),
+        ({'version': 'V1'}, "version: unknown version 'V1' of chain left_leg"),
+        ({'chains': ['left_leg', 'head_imu'], 'version': 'v1'}, 'as in head_imu=v'),
+        ({'chains': ['left_leg=v7']}, "chains: unknown version 'v7' of chain left_leg"),
+        (
+            {'chains': ['lef_leg']},
+            "chains: unknown chain 'lef_leg'; did you mean 'left_leg'?",
+        ),
+        (
+            {'chains': []},
+            'chains: no chain is named; allowed: one or more of left_leg, right_leg',
+        ),
+        (
+            {'chains': ['left_leg', 'left_leg=v1']},
+            'chains: chain left_leg is named twice',
+        ),
+        (
+            {'chains': ['left_leg=v3', 'right_leg']},
+            'chains: left_leg=v3 and right_leg=v2_5 do not go',
+        ),
+        ({'foot_frame': 'toe'}, "foot_frame: found 'toe', allowed: dh or sole"),
+        (
+            {'joint_prefix': 'a\nb'},
+            r"joint_prefix: found 'a\\nb', allowed: printable characters",
+        ),
+        ({'frame_prefix': 'a b'}, "frame_prefix: found 'a b', allowed: printable"),
+        (
+            {'frame_prefix': '/icub1/'},
+            "frame_prefix: found '/icub1/', allowed: .* no leading slash",
+        ),
+        ({'joint_timeout': -0.1}, 'joint_timeout: found -0.1, allowed: 0 to 1e'),
+        ({'joint_timeout': 1.1e6}, 'joint_timeout: found 1100000.0'),
+        ({'joint_timeout': float('nan')}, 'joint_timeout: found nan'),
+        ({'joint_timeout': float('inf')}, 'joint_timeout: found inf'),
+        (
+            {'stamp_source': 'later'},
+            "stamp_source: found 'later', allowed: message or now",
+        ),
+    ],
+    ids=str,
+)
+def test_a_value_that_cannot_be_used_is_refused_with_the_choices(
+    shipped, values, refused
+):
     with pytest.raises(ParameterError, match=f'^parameter .*{refused}') as error:
         Configuration.checked(shipped, **values)
     assert '\n' not in str(error.value)
 
 
+def test_joints_are_looked_for_under_their_prefix(shipped, tmp_path):
+    configuration = Configuration.checked(
+        shipped, chains=['left_leg'], joint_prefix='icub 1/'
+    )
+    (leg,) = configuration.chains
+    bare = shipped.chain('left_leg')
+    assert leg.joint_names == tuple(f'icub 1/{name}' for name in bare.joint_names)
+    assert leg.pose([0.1] * 6) == bare.pose([0.1] * 6)
+    file = tmp_path / 'led.yaml'
+    rows = (
+        '[{type: prismatic, a: 0, d: 0.1, alpha: 0, joint: lift}, '
+        '{type: prismatic, a: 0, d: 0, alpha: 0, joint: lift, gain: 2}]'
+    )
+    file.write_text(re.sub(r'links: \[.*\]}', f'links: {rows}}}', ARMS))
+    (arm,) = Configuration.checked(
+        Catalog.load(file), chains=['arm=a'], joint_prefix='x'
+    ).chains
+    assert [row.joint for row in arm.rows()] == ['xlift', 'xlift']
+
+
+def test_two_chains_with_the_topics_of_one_are_refused():
+    text = (
+        own_description('v2_5')
+        .replace('l_sole', 'sole one')
+        .replace('r_sole', 'sole-one')
+    )
+    catalog = Catalog.from_urdf(Urdf.parse(text.encode(), 'robot.urdf'))
+    refused = (
+        'sole one and sole-one have the same tip, sole_one, and so the same topics'
+    )
+    with pytest.raises(ParameterError, match=refused):
+        Configuration.checked(catalog, chains=['sole one', 'sole-one'])
+
+
+def test_without_a_catalog_the_chains_wait_for_a_description():
+    configuration = Configuration.checked(None, chains=['l_sole'], version='urdf')
+    assert (configuration.chains, configuration.awaited) == ((), ('l_sole',))
+    for values, refused in (
+        ({'version': 'v3'}, "version: found 'v3', allowed with descr"),
+        ({'chains': []}, 'chains: no chain is named'),
+        ({'stamp_source': 'later'}, 'stamp_source'),
+    ):
+        with pytest.raises(ParameterError, match=refused):
+            Configuration.checked(None, **values)
+
+
 def test_a_chain_without_a_default_version_needs_one(arms):
-    with pytest.raises(ParameterError, match=r'^parameter version: chain arm has .* a, b'):
+    with pytest.raises(
+        ParameterError, match=r'^parameter version: chain arm has .* a, b'
+    ):
         Configuration.checked(arms, chains=['arm'])
 
 
 def test_the_limits_of_the_timeout_are_allowed(shipped):
     for seconds in (0.0, 1e6):
-        assert Configuration.checked(shipped, joint_timeout=seconds).joint_timeout == seconds
+        assert (
+            Configuration.checked(shipped, joint_timeout=seconds).joint_timeout
+            == seconds
+        )
 
 
 def test_what_is_doubtful_in_the_file_is_passed_on(tmp_path):

@@ -25,10 +25,14 @@ def test_of_a_healthy_robot_there_is_nothing_to_say(robot):
     assert lines(robot) == []
 
 
-@pytest.mark.parametrize(('names', 'positions', 'fault'), [
-    (BOTH, [0.3, *STANDING], 'position has 13 values for 12 names'),
-    (BOTH, STANDING[1:], 'position has 11 values for 12 names'),
-    ((*BOTH, 'l_knee'), [0.0, *STANDING], "name 'l_knee' appears twice")])
+@pytest.mark.parametrize(
+    ('names', 'positions', 'fault'),
+    [
+        (BOTH, [0.3, *STANDING], 'position has 13 values for 12 names'),
+        (BOTH, STANDING[1:], 'position has 11 values for 12 names'),
+        ((*BOTH, 'l_knee'), [0.0, *STANDING], "name 'l_knee' appears twice"),
+    ],
+)
 def test_rejected_messages(robot, names, positions, fault):
     robot.send(0)
     robot.send(1, names, positions)
@@ -41,12 +45,15 @@ def test_rejected_messages(robot, names, positions, fault):
 def test_malformed_messages(robot):
     robot.feed(b'\x00\x01\x00\x00')
     assert lines(robot) == [
-        '1 message rejected: JointState: header.stamp ends at byte 12; allowed: 4']
+        '1 message rejected: JointState: header.stamp ends at byte 12; allowed: 4'
+    ]
 
 
 def test_empty_positions_only_if_nothing_else_comes(robot):
     robot.send(0, BOTH, [])
-    assert lines(robot) == ['no message on /joint_states has positions: position is empty']
+    assert lines(robot) == [
+        'no message on /joint_states has positions: position is empty'
+    ]
     robot.send(1, BOTH, [])
     robot.send(2)
     assert lines(robot) == []
@@ -61,7 +68,8 @@ def test_joints_that_hold_a_chain_back(robot):
     robot.send(1003, BOTH, [math.nan] + [0.0] * 11)
     assert lines(robot) == [
         'left_leg: no pose from 1 message: l_hip_pitch 1.001 s old',
-        'left_leg: no pose from 1 message: l_hip_pitch nan']
+        'left_leg: no pose from 1 message: l_hip_pitch nan',
+    ]
 
 
 def test_velocities_that_are_wanted_and_do_not_come():
@@ -71,45 +79,81 @@ def test_velocities_that_are_wanted_and_do_not_come():
     unknown = ', '.join(f'{joint} unknown' for joint in RIGHT)
     assert lines(robot) == [
         'left_leg: no twist from 1 message: velocity of l_ankle_roll inf',
-        f'right_leg: no twist from 1 message: velocity of {unknown}']
+        f'right_leg: no twist from 1 message: velocity of {unknown}',
+    ]
 
 
 def test_degrees_and_joints_out_of_range(robot):
     robot.send(0, BOTH, [0.0] * 3 + [-45.0, 0.0, 0.6] + [0.0] * 6)
     assert lines(robot) == [
         'left_leg: positions look like degrees, radians are expected: l_knee -45',
-        'left_leg: out of range: l_knee -45, l_ankle_roll 0.6']
+        'left_leg: out of range: l_knee -45, l_ankle_roll 0.6',
+    ]
 
 
 def test_a_loop_is_told_from_publishers_that_contradict_each_other(robot):
     def loop(times):
         for ms in [*range(100)] * times:
             robot.send(ms)
+
     loop(1)
     assert lines(robot) == []
     for _ in range(2):
         loop(1)
-        assert lines(robot) == ['time stepped back to 1700000000.000 s; held joints are forgotten']
+        assert lines(robot) == [
+            'time stepped back to 1700000000.000 s; held joints are forgotten'
+        ]
     loop(5)
     assert lines(robot) == [
-        'time stepped back 5 times, last to 1700000000.000 s; held joints are forgotten']
+        'time stepped back 5 times, last to 1700000000.000 s; held joints are forgotten'
+    ]
     for ms in range(100):
         robot.send(100 + ms)
         robot.send(99 + ms)
     assert lines(robot) == [
         'time stepped back 100 times in 200 messages, last to 1700000000.198 s: do several '
-        'publishers bring the same joints?']
+        'publishers bring the same joints?'
+    ]
 
 
-@pytest.mark.parametrize(('name', 'is_near'), [
-    ('L_KNEE', True), ('icub/l_knee', True), ('icub::l_knee', True), ('l_knee_joint', True),
-    ('ICUB_L_KNEE', True), ('r_knee', False), ('special_knee', False), ('l_kneecap', False)])
-def test_names_that_match_nothing_with_those_that_are_near(robot, name, is_near):
-    hint = f"; '{name}' is nearly 'l_knee', but names must be equal" if is_near else ''
+NEAR = "; '{}' is nearly 'l_knee', but names must be equal"
+PREFIX = "; '{}' is looked for with joint_prefix:={}"
+
+
+@pytest.mark.parametrize(
+    ('name', 'hint'),
+    [
+        ('L_KNEE', NEAR),
+        ('l_knee_joint', NEAR),
+        ('ICUB_L_KNEE', NEAR),
+        ('icub/l_knee_1', NEAR),
+        ('icub/l_knee', PREFIX.format('icub/l_knee', 'icub/')),
+        ('icub::l_knee', PREFIX.format('icub::l_knee', 'icub::')),
+        ('r_knee', ''),
+        ('special_knee', ''),
+        ('l_kneecap', ''),
+    ],
+)
+def test_names_that_match_nothing_with_those_that_are_near(robot, name, hint):
     robot.send(0, ('wheel', name, *RIGHT[4:]))
     assert lines(robot)[0] == (
         f'left_leg: no message on /joint_states has one of its joints ({", ".join(LEFT)}); names '
-        f'that came: wheel, {name}, r_ankle_pitch, r_ankle_roll{hint}')
+        f'that came: wheel, {name}, r_ankle_pitch, r_ankle_roll{hint.format(name)}'
+    )
+
+
+@pytest.mark.parametrize(
+    ('name', 'prefix'), [('icub1/l_knee', 'icub1/'), ('l_knee', '""')]
+)
+def test_names_under_another_prefix(name, prefix):
+    robot = LegInput(velocities=False, joint_prefix='icub2/')
+    robot.send(0, [name])
+    [left, right] = [
+        note.text for note in notes_of(robot.take_look(), joint_prefix='icub2/')
+    ]
+    assert 'has one of its joints (icub2/l_hip_pitch, icub2/l_hip_roll' in left
+    assert left.endswith(PREFIX.format(name, prefix))
+    assert right.endswith(f'names that came: {name}')
 
 
 def test_many_long_names_fit_a_line(robot):
@@ -130,8 +174,10 @@ def test_joints_of_one_name_from_two_robots(robot):
     for ms in range(4):
         robot.send(ms, frame_id=f'robot{ms % 2 + 1}/base')
     for line, side in zip(lines(robot), ('left', 'right'), strict=True):
-        assert line == (f'{side}_leg: {side[0]}_hip_pitch comes under the frame ids '
-                        "'robot1/base' and 'robot2/base': from 2 robots?")
+        assert line == (
+            f'{side}_leg: {side[0]}_hip_pitch comes under the frame ids '
+            "'robot1/base' and 'robot2/base': from 2 robots?"
+        )
 
 
 def test_two_frame_ids_of_different_joints_are_no_conflict(robot):

@@ -11,15 +11,35 @@ from support.oracle import quaternion_to_matrix
 
 LENGTHS = st.one_of(st.sampled_from([0.0, -0.0, 1.0]), st.floats(-2, 2))
 ANGLES = st.one_of(
-    st.sampled_from([0.0, pi / 2, -pi / 2, pi, -pi, 3 * pi / 2, 1e-9, -1e-300, pi / 2 + 1e-12,
-                     pi - 1e-12]),
-    st.floats(-4, 4))
+    st.sampled_from(
+        [
+            0.0,
+            pi / 2,
+            -pi / 2,
+            pi,
+            -pi,
+            3 * pi / 2,
+            1e-9,
+            -1e-300,
+            pi / 2 + 1e-12,
+            pi - 1e-12,
+        ]
+    ),
+    st.floats(-4, 4),
+)
 GAINS = st.sampled_from([1.0, 1.0, -1.0, 0.5, -2.0])
 
 
 def links(joint_types: Sequence[str]) -> st.SearchStrategy[DHLink]:
-    return st.builds(DHLink, a=LENGTHS, d=LENGTHS, alpha=ANGLES, offset=ANGLES,
-                     joint_type=st.sampled_from(joint_types), gain=GAINS)
+    return st.builds(
+        DHLink,
+        a=LENGTHS,
+        d=LENGTHS,
+        alpha=ANGLES,
+        offset=ANGLES,
+        joint_type=st.sampled_from(joint_types),
+        gain=GAINS,
+    )
 
 
 LINKS = links(['revolute', 'revolute', 'prismatic', 'fixed'])
@@ -36,14 +56,23 @@ def transforms(draw: st.DrawFn) -> np.ndarray:
     return T
 
 
-def chain_of(links: Sequence[DHLink], T_root_0: np.ndarray | None = None,
-             T_n_tip: np.ndarray | None = None, joint_names: Sequence[str] = ()) -> Chain:
+def chain_of(
+    links: Sequence[DHLink],
+    T_root_0: np.ndarray | None = None,
+    T_n_tip: np.ndarray | None = None,
+    joint_names: Sequence[str] = (),
+) -> Chain:
     moving = [i for i, link in enumerate(links) if link.joint_type != 'fixed']
     return Chain(
-        name='any', version='', root_frame='root', tip='tip',
-        joint_names=tuple(joint_names or (f'joint_{i}' for i in moving)), links=tuple(links),
+        name='any',
+        version='',
+        root_frame='root',
+        tip='tip',
+        joint_names=tuple(joint_names or (f'joint_{i}' for i in moving)),
+        links=tuple(links),
         T_root_0=np.eye(4) if T_root_0 is None else T_root_0,
-        T_n_tip=np.eye(4) if T_n_tip is None else T_n_tip)
+        T_n_tip=np.eye(4) if T_n_tip is None else T_n_tip,
+    )
 
 
 @st.composite
@@ -60,8 +89,11 @@ def rows_that_follow(draw: st.DrawFn) -> tuple[list[DHLink], list[str]]:
     rows = draw(row_lists())
     moving = [i for i, row in enumerate(rows) if row.joint_type != 'fixed']
     joints = [f'joint_{i}' for i in range(draw(st.integers(1, len(moving))))]
-    followers = st.lists(st.sampled_from(joints), min_size=len(moving) - len(joints),
-                         max_size=len(moving) - len(joints))
+    followers = st.lists(
+        st.sampled_from(joints),
+        min_size=len(moving) - len(joints),
+        max_size=len(moving) - len(joints),
+    )
     names = draw(st.permutations([*joints, *draw(followers)]))
     for i, name in zip(moving, names, strict=True):
         rows[i] = replace(rows[i], joint=name)
@@ -71,13 +103,17 @@ def rows_that_follow(draw: st.DrawFn) -> tuple[list[DHLink], list[str]]:
 IN_ORDER = st.builds(chain_of, row_lists(), transforms(), transforms())
 FOLLOWING = st.builds(
     lambda rows, root, tip: chain_of(rows[0], root, tip, rows[1]),
-    rows_that_follow(), transforms(), transforms())
+    rows_that_follow(),
+    transforms(),
+    transforms(),
+)
 CHAINS = st.one_of(IN_ORDER, FOLLOWING)
 
 
 @st.composite
-def chains_and_positions(draw: st.DrawFn, chains: st.SearchStrategy[Chain] = CHAINS
-                         ) -> tuple[Chain, list[list[float]]]:
+def chains_and_positions(
+    draw: st.DrawFn, chains: st.SearchStrategy[Chain] = CHAINS
+) -> tuple[Chain, list[list[float]]]:
     chain = draw(chains)
     q = st.lists(ANGLES, min_size=chain.n, max_size=chain.n)
     return chain, draw(st.lists(q, min_size=1, max_size=3))

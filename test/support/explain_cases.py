@@ -6,9 +6,12 @@ from io import StringIO
 import json
 from pathlib import Path
 from typing import NamedTuple
+from unittest.mock import patch
 
 from icub_leg_fk.__main__ import main
+from icub_leg_fk.commands import explain as command
 from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.tools.explanation import explain as work_out
 import numpy as np
 import pytest
 
@@ -22,9 +25,22 @@ def explain(*words):
     return _explain(*map(str, words))
 
 
-@cache  # formulas take seconds
+# Formulas take seconds, so each is worked out once, whatever forms of it are printed.
+@cache
+def _worked_out(chain, q, exact):
+    return work_out(chain, q, exact=exact)
+
+
+def _worked_out_once(chain, q, *, exact):
+    return _worked_out(chain, None if q is None else tuple(q), exact)
+
+
+@cache
 def _explain(*words):
-    with redirect_stdout(StringIO()) as output:
+    with (
+        patch.object(command, 'explain', _worked_out_once),
+        redirect_stdout(StringIO()) as output,
+    ):
         assert main(['explain', *words]) == 0
     return output.getvalue()
 
@@ -61,8 +77,12 @@ PANDA = Case('panda', 'flange', EXAMPLES / 'panda.yaml')
 ODD = Case('odd_arm', 'sole', ODD_ARM)
 
 OF_EACH_KIND = [LEG, Case('right_leg=v3', 'sole'), HEAD, ARM, UR5, PANDA, ODD]
-LEGS = [Case(f'{side}_leg={version}', frame) for side in ('left', 'right')
-        for version in ('v1', 'v2_5', 'v3') for frame in ('dh', 'sole')]
+LEGS = [
+    Case(f'{side}_leg={version}', frame)
+    for side in ('left', 'right')
+    for version in ('v1', 'v2_5', 'v3')
+    for frame in ('dh', 'sole')
+]
 
 
 def _name(case):
@@ -70,7 +90,8 @@ def _name(case):
 
 
 every_chain = pytest.mark.parametrize(
-    'case', [*LEGS, HEAD, ARM, UR5, PANDA, ODD, ODD._replace(frame='dh')], ids=_name)
+    'case', [*LEGS, HEAD, ARM, UR5, PANDA, ODD, ODD._replace(frame='dh')], ids=_name
+)
 one_chain_of_each_kind = pytest.mark.parametrize('case', OF_EACH_KIND, ids=_name)
 
 

@@ -65,7 +65,9 @@ class Message:
     padding: int = 0
 
     def cdr(self):
-        out = bytearray(b'\x00\x01\x00\x00' if self.order == '<' else b'\x00\x00\x00\x00')
+        out = bytearray(
+            b'\x00\x01\x00\x00' if self.order == '<' else b'\x00\x00\x00\x00'
+        )
 
         def align(size):
             while (len(out) - 4) % size:

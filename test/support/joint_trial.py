@@ -12,8 +12,23 @@ from icub_leg_fk.stream.joint_input import JointInput
 from support.joint_model import JointModel, LARGEST, Message
 
 SECOND = 1_000_000_000
-SPECIAL = (math.nan, math.inf, -math.inf, 0.0, -0.0, 1.0, math.nextafter(1.0, 2.0), -1.0, 0.5,
-           LARGEST, -LARGEST, math.nextafter(LARGEST, 0.0), 1.7e308, -1.7e308, 5e-324)
+SPECIAL = (
+    math.nan,
+    math.inf,
+    -math.inf,
+    0.0,
+    -0.0,
+    1.0,
+    math.nextafter(1.0, 2.0),
+    -1.0,
+    0.5,
+    LARGEST,
+    -LARGEST,
+    math.nextafter(LARGEST, 0.0),
+    1.7e308,
+    -1.7e308,
+    5e-324,
+)
 
 
 def bits(values):
@@ -28,10 +43,14 @@ def decode_joint_state(data):
     sec, nanosec = struct.unpack_from(f'{order}iI', data, 4)
     positions, velocities = layout.positions, layout.velocities
     return Message(
-        sec, nanosec, layout.names,
+        sec,
+        nanosec,
+        layout.names,
         struct.unpack_from(f'{order}{positions.n}d', data, positions.at),
         struct.unpack_from(f'{order}{velocities.n}d', data, velocities.at),
-        frame_id=layout.frame_id, order=order)
+        frame_id=layout.frame_id,
+        order=order,
+    )
 
 
 class Trial:
@@ -61,8 +80,15 @@ class Trial:
         for vector in vectors:
             assert vector.chain in self.chains
             assert vector.stamp == sec * SECOND + nanosec
-            found.append((vector.chain.name, vector.sec, vector.nanosec, bits(vector.positions),
-                          bits(vector.velocities)))
+            found.append(
+                (
+                    vector.chain.name,
+                    vector.sec,
+                    vector.nanosec,
+                    bits(vector.positions),
+                    bits(vector.velocities),
+                )
+            )
         assert found == expected, message
         return len(found)
 
@@ -88,16 +114,26 @@ class Trial:
             name = chain.name
             of_chain = look.chains[name]
             assert of_chain.chain is chain
-            assert (of_chain.ready, of_chain.silent) == (model.ready[name], model.silent[name])
+            assert (of_chain.ready, of_chain.silent) == (
+                model.ready[name],
+                model.silent[name],
+            )
             assert of_chain.held_back == model.held_back[name]
-            concerned = set()
-            for reason in of_chain.joints.keys() - {'looks_like_degrees'}:
-                concerned |= {(reason, joint) for joint in of_chain.joints[reason]}
-            assert concerned == model.concerned[name]
-            assert self.input.held_stamps(chain) == {
-                joint: model.held[joint].stamp for joint in model.chains[name]
-                if joint in model.held}
+            assert concerned_joints(of_chain) == model.concerned[name]
+            held = {
+                joint: model.held[joint].stamp
+                for joint in model.held.keys() & set(model.chains[name])
+            }
+            assert self.input.held_stamps(chain) == held
         model.count_anew()
+
+
+def concerned_joints(of_chain):
+    """Return the reasons of which the rules know, each with a joint it concerns."""
+    concerned = set()
+    for reason in of_chain.joints.keys() - {'looks_like_degrees'}:
+        concerned |= {(reason, joint) for joint in of_chain.joints[reason]}
+    return concerned
 
 
 @dataclass(frozen=True)
@@ -126,8 +162,21 @@ class Step:
     padding: int
 
 
-FAULTS = ('position', 'velocity', 'cut', 'drop', 'repeat', 'reverse', 'swap', 'stranger', 'back',
-          'late', 'zero stamp', 'again', 'no carry')
+FAULTS = (
+    'position',
+    'velocity',
+    'cut',
+    'drop',
+    'repeat',
+    'reverse',
+    'swap',
+    'stranger',
+    'back',
+    'late',
+    'zero stamp',
+    'again',
+    'no carry',
+)
 
 
 def publishers(chains):
@@ -138,7 +187,8 @@ def publishers(chains):
     names = st.one_of(
         st.sampled_from([tuple(joints), *own, ('wheel', *joints, '')]),
         st.permutations(joints).map(tuple),
-        st.lists(st.sampled_from(joints + strangers), unique=True).map(tuple))
+        st.lists(st.sampled_from(joints + strangers), unique=True).map(tuple),
+    )
     publisher = st.builds(
         Publisher,
         names=names,
@@ -147,7 +197,8 @@ def publishers(chains):
         efforts=st.sampled_from((0, 1, 1, 1.5, 0.5)),
         frame_id=st.sampled_from(('', 'base_link')),
         order=st.sampled_from('<<<>'),
-        extra=st.sampled_from((0, 0, 4, 9)))
+        extra=st.sampled_from((0, 0, 4, 9)),
+    )
     return st.lists(publisher, min_size=1, max_size=12)
 
 
@@ -163,9 +214,12 @@ def steps(faults):
         fault=st.sampled_from(choices),
         at=st.integers(0, 40),
         value=st.sampled_from(SPECIAL),
-        shift=st.sampled_from((0, 1, 10**6, SECOND // 2, SECOND // 2 + 1, 3 * SECOND, 10**19)),
-        padding=st.sampled_from((0, 0, 255)))
-    return st.lists(step, max_size=60)
+        shift=st.sampled_from(
+            (0, 1, 10**6, SECOND // 2, SECOND // 2 + 1, 3 * SECOND, 10**19)
+        ),
+        padding=st.sampled_from((0, 0, 255)),
+    )
+    return st.lists(step, min_size=10, max_size=60)
 
 
 STARTS = st.sampled_from((0, 7, 1_700_000_000, -3, 2**31 - 20))  # s
@@ -188,14 +242,24 @@ def traffic(publishers, steps, start):
         elif step.fault == 'again':
             stamp = last.get(publisher, stamp)
         last[publisher] = stamp
-        carry = 1 + step.at % 3 if step.fault == 'no carry' else 0  # some publishers do not
+        carry = (
+            1 + step.at % 3 if step.fault == 'no carry' else 0
+        )  # some publishers do not
         sec, nanosec = divmod(stamp, SECOND)
         sec = min(max(sec, carry - 2**31), 2**31 - 1)
         names, positions, velocities, efforts = contents(publisher, number, step)
         yield Message(
-            sec - carry, nanosec + carry * SECOND, tuple(names), tuple(positions),
-            tuple(velocities), tuple(efforts), publisher.frame_id, publisher.order,
-            publisher.extra, step.padding)
+            sec - carry,
+            nanosec + carry * SECOND,
+            tuple(names),
+            tuple(positions),
+            tuple(velocities),
+            tuple(efforts),
+            publisher.frame_id,
+            publisher.order,
+            publisher.extra,
+            step.padding,
+        )
 
 
 def contents(publisher, number, step):
@@ -205,7 +269,7 @@ def contents(publisher, number, step):
     positions = values(number, n + publisher.surplus)
     velocities = values(number, int(n * publisher.velocities))
     efforts = values(number, int(n * publisher.efforts))
-    at = step.at % n if n else 0
+    at = step.at % max(n, 1)
     if step.fault == 'position' and n:
         positions[at] = step.value
     elif step.fault == 'velocity' and velocities:
@@ -213,7 +277,7 @@ def contents(publisher, number, step):
     elif step.fault == 'cut':
         del positions[at:]
     elif step.fault == 'drop':
-        del names[at:at + 1]
+        del names[at : at + 1]
     elif step.fault == 'repeat' and n:
         names[-1] = names[at]
     elif step.fault == 'reverse':

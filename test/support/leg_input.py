@@ -1,6 +1,7 @@
 """A joint input of the iCub's legs, fed with messages of which a test says what matters to it."""
 
 from icub_leg_fk.kinematics import Catalog
+from icub_leg_fk.stream.configuration import Configuration
 from icub_leg_fk.stream.joint_input import JointInput
 from support.joint_model import Message
 
@@ -14,16 +15,19 @@ BOTH = LEFT + RIGHT
 class LegInput(JointInput):
     """A joint input of both legs."""
 
-    def __init__(self, timeout=0.5, velocities=True):
+    def __init__(self, timeout=0.5, velocities=True, joint_prefix=''):
         super().__init__(lambda: START)
-        self.configure(LEGS, timeout, velocities)
+        legs = Configuration.checked(Catalog.load(), joint_prefix=joint_prefix).chains
+        self.configure(legs, timeout, velocities)
 
     def send(self, ms, names=BOTH, positions=None, velocities=(), **more):
         """Send a message at a time [ms from the start] and return what it makes ready."""
         sec, nanosec = divmod(START + ms * MS, 1_000_000_000)
         if positions is None:
             positions = [-0.01 * i for i in range(len(names))]
-        message = Message(sec, nanosec, tuple(names), tuple(positions), tuple(velocities), **more)
+        message = Message(
+            sec, nanosec, tuple(names), tuple(positions), tuple(velocities), **more
+        )
         return self.feed(message.cdr())
 
     def ready(self, *args, **kwargs):

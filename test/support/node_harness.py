@@ -40,14 +40,17 @@ DEEP = QoSProfile(depth=5000)  # reliable
 _numbers = itertools.count(1)
 _WITHOUT_EVENTS_EXECUTOR = (
     "import sys; sys.modules['rclpy.experimental.events_executor'] = None; "
-    'from icub_leg_fk.node.main import main; sys.exit(main())')
+    'from icub_leg_fk.node.main import main; sys.exit(main())'
+)
 
 
 LOSSLESS = {
     'qos_overrides.{ns}/joint_states.subscription.reliability': 'reliable',
     'qos_overrides.{ns}/joint_states.subscription.depth': 5000,
-    **{f'qos_overrides.{{ns}}/foot_pose_publisher/{tip}/pose.publisher.depth': 5000
-       for tip in FEET},
+    **{
+        f'qos_overrides.{{ns}}/foot_pose_publisher/{tip}/pose.publisher.depth': 5000
+        for tip in FEET
+    },
 }
 """Parameters by which no message is lost, however fast they come."""
 
@@ -63,19 +66,36 @@ class NodeProcess:
         environment: variables to add.
     """
 
-    def __init__(self, parameters=None, arguments=(), namespace=None, events_executor=True,
-                 environment=None):
+    def __init__(
+        self,
+        parameters=None,
+        arguments=(),
+        namespace=None,
+        events_executor=True,
+        environment=None,
+    ):
         self.namespace = f'/robot_{next(_numbers)}' if namespace is None else namespace
-        program = (['-m', 'icub_leg_fk.node.main'] if events_executor
-                   else ['-c', _WITHOUT_EVENTS_EXECUTOR])
-        command = [sys.executable, *program, '--ros-args', '-r', f'__ns:={self.namespace or "/"}',
-                   *arguments]
+        program = ['-m', 'icub_leg_fk.node.main']
+        if not events_executor:
+            program = ['-c', _WITHOUT_EVENTS_EXECUTOR]
+        command = [
+            sys.executable,
+            *program,
+            '--ros-args',
+            '-r',
+            f'__ns:={self.namespace or "/"}',
+            *arguments,
+        ]
         for name, value in (parameters or {}).items():
             command += ['-p', f'{name.format(ns=self.namespace)}:={json.dumps(value)}']
         self._log = tempfile.TemporaryFile()
         self.process = subprocess.Popen(  # a session of its own, to find strays by
-            command, stdout=self._log, stderr=subprocess.STDOUT, start_new_session=True,
-            env={**os.environ, **(environment or {})})
+            command,
+            stdout=self._log,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+            env={**os.environ, **(environment or {})},
+        )
 
     def __enter__(self):
         return self
@@ -95,7 +115,9 @@ class NodeProcess:
     def log(self):
         """Return what the node has written so far."""
         size = os.fstat(self._log.fileno()).st_size
-        return os.pread(self._log.fileno(), size, 0).decode()  # the node writes at its own place
+        return os.pread(
+            self._log.fileno(), size, 0
+        ).decode()  # the node writes at its own place
 
     def stop(self, *signals):
         """Stop it (SIGINT, unless told otherwise) and check that it ends well."""
@@ -112,7 +134,13 @@ class NodeProcess:
             raise AssertionError(f'still running; it says:\n{self.log()}') from None
         log = self.log()
         assert found == code, f'exit code {found}; it says:\n{log}'
-        for word in ('Traceback', 'Exception', 'terminate called', 'Fatal', 'Segmentation'):
+        for word in (
+            'Traceback',
+            'Exception',
+            'terminate called',
+            'Fatal',
+            'Segmentation',
+        ):
             assert word not in log, log
         assert processes_of_session(self.process.pid) == []
 
@@ -132,7 +160,9 @@ def processes_of_session(session):
         try:
             fields = stat.read_text().rpartition(')')[2].split()
             if int(fields[3]) == session and fields[0] != 'Z':
-                found.append((stat.parent / 'cmdline').read_bytes().replace(b'\0', b' '))
+                found.append(
+                    (stat.parent / 'cmdline').read_bytes().replace(b'\0', b' ')
+                )
         except OSError:  # it has ended meanwhile
             continue
     return found
@@ -172,14 +202,20 @@ class Robot:
     def __init__(self, node, tips=FEET, name='foot_pose_publisher'):
         self._context = Context()
         rclpy.init(context=self._context)
-        self.node = Node('robot', namespace=node.namespace, context=self._context,
-                         enable_rosout=False)
+        self.node = Node(
+            'robot',
+            namespace=node.namespace,
+            context=self._context,
+            enable_rosout=False,
+        )
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._name = name
         self._name_in_status = f'{node.namespace}/{name}'.lstrip('/')
         self.joints = self.node.create_publisher(JointState, 'joint_states', DEEP)
-        self.poses = {tip: self.listen(PoseStamped, f'{name}/{tip}/pose') for tip in tips}
+        self.poses = {
+            tip: self.listen(PoseStamped, f'{name}/{tip}/pose') for tip in tips
+        }
         self.left, self.right = (self.poses.get(tip) for tip in FEET)
         self.diagnostics = self.listen(DiagnosticArray, '/diagnostics')
         self._parameters = None
@@ -213,7 +249,9 @@ class Robot:
         """Publish a JointState with a stamp [ns]; positions default to -0.01, -0.02, ..."""
         if positions is None:
             positions = [-0.01 * (i + 1) for i in range(len(names))]
-        message = JointState(name=list(names), position=[float(p) for p in positions], **fields)
+        message = JointState(
+            name=list(names), position=[float(p) for p in positions], **fields
+        )
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, SECOND)
         (publisher or self.joints).publish(message)
 
@@ -225,6 +263,7 @@ class Robot:
 
         def is_answered():
             return all(stamp in inbox.stamps()[-1:] for inbox in inboxes)
+
         while not is_answered():
             assert time.monotonic() < deadline, 'the node does not answer'
             stamp += 1000
@@ -238,8 +277,10 @@ class Robot:
 
     def wait_for(self, inbox, stamp):
         """Wait until the newest message of an inbox has this stamp."""
-        self.until(lambda: inbox.stamps()[-1:] == [stamp], f'stamp {stamp} after '
-                   f'{inbox.stamps()[-3:]}')
+        self.until(
+            lambda: inbox.stamps()[-1:] == [stamp],
+            f'stamp {stamp} after {inbox.stamps()[-3:]}',
+        )
 
     def take(self, inbox, last):
         """Return what an inbox holds up to a stamp, once that is there, and empty it."""
@@ -262,8 +303,10 @@ class Robot:
 
     def change(self, **values):
         """Set parameters atomically (`__` stands for a dot) and return the result."""
-        changes = [Parameter(name.replace('__', '.'), value=value)
-                   for name, value in values.items()]
+        changes = [
+            Parameter(name.replace('__', '.'), value=value)
+            for name, value in values.items()
+        ]
         return self.result(self.parameters().set_parameters_atomically(changes)).result
 
     def statuses(self, condition, meanwhile=lambda: None):
@@ -289,6 +332,7 @@ class Robot:
                     return True
             self.diagnostics.clear()
             return False
+
         self.until(have_come, seen)
         return seen[-1]
 
@@ -298,5 +342,7 @@ class Robot:
             node, _, chain = status.name.partition(': ')
             if node == self._name_in_status:
                 values = {item.key: item.value for item in status.values}
-                statuses[chain] = Status(status.level, status.message, status.hardware_id, values)
+                statuses[chain] = Status(
+                    status.level, status.message, status.hardware_id, values
+                )
         return statuses

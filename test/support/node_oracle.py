@@ -23,7 +23,9 @@ def oracle_pose(chain, version, q, foot_frame='dh'):
 
 def oracle_jacobian(chain, version, q, foot_frame='dh'):
     """Return the (6, n) Jacobian of the tip, linear then angular, in the axes of the root."""
-    pytest.importorskip('pinocchio', reason='Pinocchio, which knows the Jacobian, is missing')
+    pytest.importorskip(
+        'pinocchio', reason='Pinocchio, which knows the Jacobian, is missing'
+    )
     return _arm(chain, version, foot_frame).jacobian(np.array(q, dtype=float))
 
 
@@ -33,9 +35,11 @@ def pose_matrix(pose):
     q = getattr(pose, 'orientation', None) or pose.rotation
     x, y, z, w = q.x, q.y, q.z, q.w
     T = np.eye(4)
-    T[:3, :3] = [[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                 [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                 [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]
+    T[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
     T[:3, 3] = p.x, p.y, p.z
     return T
 

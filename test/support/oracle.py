@@ -15,37 +15,90 @@ import numpy as np
 Row = tuple[float, float, float, float]
 
 LEFT_V1: list[Row] = [
-    (0, 0, -pi / 2, 90), (0, 0, -pi / 2, 90), (0, -223.6, pi / 2, -90),
-    (-213, 0, pi, 90), (0, 0, -pi / 2, 0), (-41, 0, 0, 0)]
+    (0, 0, -pi / 2, 90),
+    (0, 0, -pi / 2, 90),
+    (0, -223.6, pi / 2, -90),
+    (-213, 0, pi, 90),
+    (0, 0, -pi / 2, 0),
+    (-41, 0, 0, 0),
+]
 RIGHT_V1: list[Row] = [
-    (0, 0, pi / 2, 90), (0, 0, pi / 2, 90), (0, 223.6, -pi / 2, -90),
-    (-213, 0, pi, 90), (0, 0, pi / 2, 0), (-41, 0, pi, 0)]
+    (0, 0, pi / 2, 90),
+    (0, 0, pi / 2, 90),
+    (0, 223.6, -pi / 2, -90),
+    (-213, 0, pi, 90),
+    (0, 0, pi / 2, 0),
+    (-41, 0, pi, 0),
+]
 LEFT_V2_5: list[Row] = [
-    (0, 0, -pi / 2, 90), (0, 0, -pi / 2, 90), (-0.9175, -234.545, pi / 2, -90),
-    (-200.5, 0, pi, 90), (0, 0, -pi / 2, 0), (-68.05, -3.5, 0, 0)]
+    (0, 0, -pi / 2, 90),
+    (0, 0, -pi / 2, 90),
+    (-0.9175, -234.545, pi / 2, -90),
+    (-200.5, 0, pi, 90),
+    (0, 0, -pi / 2, 0),
+    (-68.05, -3.5, 0, 0),
+]
 RIGHT_V2_5: list[Row] = [
-    (0, 0, pi / 2, 90), (0, 0, pi / 2, 90), (-0.9175, 234.545, -pi / 2, -90),
-    (-200.5, 0, pi, 90), (0, 0, pi / 2, 0), (-68.05, 3.5, pi, 0)]
+    (0, 0, pi / 2, 90),
+    (0, 0, pi / 2, 90),
+    (-0.9175, 234.545, -pi / 2, -90),
+    (-200.5, 0, pi, 90),
+    (0, 0, pi / 2, 0),
+    (-68.05, 3.5, pi, 0),
+]
 # Of iKin, not of the documents; the left knee's d is the robot's, which iKin prints as +6.2.
 LEFT_V3: list[Row] = [
-    (9, 0, -pi / 2, 90), (-15, -10.6, -pi / 2, 90), (15, -266.8, pi / 2, -90),
-    (-255.988, -6.2, pi, 90), (-35, 0, -pi / 2, 0), (-53.2, 0, 0, 0)]
+    (9, 0, -pi / 2, 90),
+    (-15, -10.6, -pi / 2, 90),
+    (15, -266.8, pi / 2, -90),
+    (-255.988, -6.2, pi, 90),
+    (-35, 0, -pi / 2, 0),
+    (-53.2, 0, 0, 0),
+]
 RIGHT_V3: list[Row] = [
-    (9, 0, pi / 2, 90), (-15, 10.6, pi / 2, 90), (15, 266.8, -pi / 2, -90),
-    (-255.988, 6.2, pi, 90), (-35, 0, pi / 2, 0), (-53.2, 0, pi, 0)]
+    (9, 0, pi / 2, 90),
+    (-15, 10.6, pi / 2, 90),
+    (15, 266.8, -pi / 2, -90),
+    (-255.988, 6.2, pi, 90),
+    (-35, 0, pi / 2, 0),
+    (-53.2, 0, pi, 0),
+]
 HEAD_V2: list[Row] = [
-    (32, 0, pi / 2, 0), (0, -5.5, pi / 2, -90), (0, -223.3, -pi / 2, -90),
-    (9.5, 0, pi / 2, 90), (0, 0, -pi / 2, -90), (18.5, 110.8, -pi / 2, 90)]
+    (32, 0, pi / 2, 0),
+    (0, -5.5, pi / 2, -90),
+    (0, -223.3, -pi / 2, -90),
+    (9.5, 0, pi / 2, 90),
+    (0, 0, -pi / 2, -90),
+    (18.5, 110.8, -pi / 2, 90),
+]
+
+# Of the URDF of iCubGenova09, read off by the documented method; not in print.
+HEAD_V3: list[Row] = [
+    (72.5, 0, -pi / 2, -90),
+    (0, 0, -pi / 2, 90),
+    (4.86151, -278.7695, -pi / 2, 0),
+    (9.5005, 0, pi / 2, 90),
+    (0, 0, pi / 2, 90),
+    (-5.5, 170.484, pi, 0),
+]
 
 
 def _leg_root(x: float, y: float, z: float) -> np.ndarray:
-    return np.array([[1, 0, 0, x / 1000], [0, 0, 1, y / 1000], [0, -1, 0, z / 1000], [0, 0, 0, 1]])
+    return np.array(
+        [[1, 0, 0, x / 1000], [0, 0, 1, y / 1000], [0, -1, 0, z / 1000], [0, 0, 0, 1]]
+    )
 
 
 HEAD_ROOT = np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
+HEAD_V3_ROOT = np.array(
+    [[0.0, 0, -1, 0], [1, 0, 0, 0], [0, -1, 0, 0.0605], [0, 0, 0, 1]]
+)
+T_NIS_V3 = np.array([[1.0, 0, 0, 0], [0, 1, 0, -0.0035], [0, 0, 1, 0], [0, 0, 0, 1]])
 T_NIS = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0.0066], [0, 0, 0, 1]])
-V3_ROOT = {side: np.array([[-1, 0, 0, 0.0216], [0, 0, -1, y], [0, -1, 0, 0], [0, 0, 0, 1]])
-           for side, y in (('left', 0.07365), ('right', -0.07365))}
+V3_ROOT = {
+    side: np.array([[-1, 0, 0, 0.0216], [0, 0, -1, y], [0, -1, 0, 0], [0, 0, 0, 1]])
+    for side, y in (('left', 0.07365), ('right', -0.07365))
+}
 SOLE = np.array([[0.0, 0, 1, 0], [0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
 
 # (chain, version): root transform, rows, transform from the tip to the last frame.
@@ -57,8 +110,11 @@ TABLES: dict[tuple[str, str], tuple[np.ndarray, list[Row], np.ndarray]] = {
     ('right_leg', 'v2_5'): (_leg_root(0, 68.1, -119.9), RIGHT_V2_5, np.eye(4)),
     ('right_leg', 'v3'): (V3_ROOT['right'], RIGHT_V3, np.eye(4)),
     ('head_imu', 'v2'): (HEAD_ROOT, HEAD_V2, T_NIS),
+    ('head_imu', 'v3'): (HEAD_V3_ROOT, HEAD_V3, T_NIS_V3),
 }
-V3_SOLE = SOLE @ np.array([[1, 0, 0, 0.02288], [0, 1, 0, 0], [0, 0, 1, -0.0126], [0, 0, 0, 1]])
+V3_SOLE = SOLE @ np.array(
+    [[1, 0, 0, 0.02288], [0, 1, 0, 0], [0, 0, 1, -0.0126], [0, 0, 0, 1]]
+)
 
 
 def tip_transform(version: str, frame: str) -> np.ndarray:
@@ -68,8 +124,11 @@ def tip_transform(version: str, frame: str) -> np.ndarray:
     return V3_SOLE if version == 'v3' else SOLE
 
 
-CASES = [(name, version, frame) for name, version in TABLES
-         for frame in (('dh', 'sole') if name != 'head_imu' else ('dh',))]
+CASES = [
+    (name, version, frame)
+    for name, version in TABLES
+    for frame in (('dh', 'sole') if name != 'head_imu' else ('dh',))
+]
 
 
 class PinocchioArm:
@@ -82,14 +141,21 @@ class PinocchioArm:
         self.pin, self.model = pin, pin.Model()
         placement, joint = pin.SE3(T_root_0), 0
         for i, (a, d, alpha, offset) in enumerate(rows):
-            placement = placement * pin.SE3(pin.utils.rotate('z', np.deg2rad(offset)), np.zeros(3))
-            joint = self.model.addJoint(joint, pin.JointModelRZ(), placement, f'joint_{i}')
+            placement = placement * pin.SE3(
+                pin.utils.rotate('z', np.deg2rad(offset)), np.zeros(3)
+            )
+            joint = self.model.addJoint(
+                joint, pin.JointModelRZ(), placement, f'joint_{i}'
+            )
             along_z = pin.SE3(np.eye(3), np.array([0, 0, d / 1000]))
             along_x = pin.SE3(np.eye(3), np.array([a / 1000, 0, 0]))
-            placement = along_z * along_x * pin.SE3(pin.utils.rotate('x', alpha), np.zeros(3))
+            placement = (
+                along_z * along_x * pin.SE3(pin.utils.rotate('x', alpha), np.zeros(3))
+            )
         placement = placement * pin.SE3(T_n_tip @ tip_transform(version, frame))
         self.tip = self.model.addFrame(
-            pin.Frame('tip', joint, 0, placement, pin.FrameType.OP_FRAME))
+            pin.Frame('tip', joint, 0, placement, pin.FrameType.OP_FRAME)
+        )
         self.data = self.model.createData()
 
     def forward(self, q: np.ndarray) -> np.ndarray:
@@ -97,8 +163,15 @@ class PinocchioArm:
         return np.array(self.data.oMf[self.tip].homogeneous)
 
     def jacobian(self, q: np.ndarray) -> np.ndarray:
-        return np.array(self.pin.computeFrameJacobian(
-            self.model, self.data, q, self.tip, self.pin.ReferenceFrame.LOCAL_WORLD_ALIGNED))
+        return np.array(
+            self.pin.computeFrameJacobian(
+                self.model,
+                self.data,
+                q,
+                self.tip,
+                self.pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
+            )
+        )
 
 
 def translation(x: float, y: float, z: float) -> np.ndarray:
@@ -117,7 +190,12 @@ def rotation_z(angle: float) -> np.ndarray:
 
 def basic_product(a: float, d: float, alpha: float, theta: float) -> np.ndarray:
     """Return one link, as the documents define it: Rz(theta) Tz(d) Tx(a) Rx(alpha)."""
-    return rotation_z(theta) @ translation(0, 0, d) @ translation(a, 0, 0) @ rotation_x(alpha)
+    return (
+        rotation_z(theta)
+        @ translation(0, 0, d)
+        @ translation(a, 0, 0)
+        @ rotation_x(alpha)
+    )
 
 
 class HandMadeArm:
@@ -130,7 +208,9 @@ class HandMadeArm:
     def forward(self, q: np.ndarray) -> np.ndarray:
         T = self.T_root_0
         for (a, d, alpha, offset), position in zip(self.rows, q, strict=True):
-            T = T @ basic_product(a / 1000, d / 1000, alpha, np.deg2rad(offset) + position)
+            T = T @ basic_product(
+                a / 1000, d / 1000, alpha, np.deg2rad(offset) + position
+            )
         return T @ self.T_n_tip @ self.T_dh_tip
 
 

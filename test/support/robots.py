@@ -10,9 +10,17 @@ def robot(joints: Sequence[str], links: int | None = None) -> str:
     return f'<robot name="made">{names}{"".join(joints)}</robot>'
 
 
-def joint(i: int, kind: str = 'revolute', xyz: str = '0 0 0', rpy: str = '0 0 0',
-          axis: str = '0 0 1', more: str = '') -> str:
+def joint(
+    i: int,
+    kind: str = 'revolute',
+    xyz: str = '0 0 0',
+    rpy: str = '0 0 0',
+    axis: str = '0 0 1',
+    more: str = '',
+) -> str:
     """Return joint j<i>, from link l<i> to the next."""
-    return (f'<joint name="j{i}" type="{kind}"><parent link="l{i}"/><child link="l{i + 1}"/>'
-            f'<origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="{axis}"/>'
-            f'<limit lower="-2" upper="2" effort="1" velocity="1"/>{more}</joint>')
+    return (
+        f'<joint name="j{i}" type="{kind}"><parent link="l{i}"/><child link="l{i + 1}"/>'
+        f'<origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="{axis}"/>'
+        f'<limit lower="-2" upper="2" effort="1" velocity="1"/>{more}</joint>'
+    )

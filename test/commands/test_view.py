@@ -1,0 +1,501 @@
+"""`leg_fk view`: its page in a real browser; what is drawn and said without one."""
+
+from contextlib import contextmanager
+import math
+from pathlib import Path
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+import webbrowser
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from icub_leg_fk.kinematics import Chain, DHLink, load_chain
+from icub_leg_fk.kinematics.rotation import turns_about
+from icub_leg_fk.tools.viewer import Viewer
+from icub_leg_fk.tools.viewer_live import live_joints, LiveJoints
+from icub_leg_fk.tools.viewer_method import arc, Method, STEPS
+from icub_leg_fk.tools.viewer_page import (
+    Posture,
+    roll_pitch_yaw,
+    running_server,
+    slider_bounds,
+    slider_start,
+)
+from icub_leg_fk.tools.viewer_recording import RecordedChain
+from icub_leg_fk.tools.viewer_scene import directions, labels, PosedChain
+import numpy as np
+import pytest
+from support.any_chain import chains_and_positions
+from support.browser import (
+    copied_texts,
+    running_tab,
+    show_page,
+    slider,
+    still_picture,
+    wait_until,
+)
+from support.leg_fk_process import assert_one_line_complaint, COMMAND, run_main
+
+EXAMPLES = Path(__file__).resolve().parents[2] / 'config' / 'examples'
+WALK = EXAMPLES / 'synthetic_walk.csv'
+LEG_JOINTS = [
+    f'{side}_{joint}'
+    for side in 'lr'
+    for joint in (
+        'hip_pitch',
+        'hip_roll',
+        'hip_yaw',
+        'knee',
+        'ankle_pitch',
+        'ankle_roll',
+    )
+]
+_LISTENS = '0A'  # state of a socket in /proc/net/tcp
+BENT = np.radians([0, 10, 0, -30, -15, 5]).tolist()
+
+
+@contextmanager
+def running_view(*words):
+    """Run the command without a browser until Ctrl-C; give the process and the page's address."""
+    process = subprocess.Popen(
+        [*COMMAND, 'view', '--no-browser', '--port', '0', *map(str, words)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        process.stdout.readline()
+        yield process, process.stdout.readline().split()[0]
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=20)
+        assert (process.returncode, out, err) == (130, '', '')
+    finally:
+        process.kill()
+        process.communicate()
+
+
+@pytest.fixture(scope='module')
+def tab():
+    """Return the one tab of the browser: drawing in two at once takes long without a GPU."""
+    pytest.importorskip('viser')
+    with running_tab() as tab:
+        yield tab
+
+
+@pytest.fixture(scope='module')
+def view():
+    pytest.importorskip('viser')
+    with running_view() as running:
+        yield running
+
+
+@pytest.fixture
+def page(tab, view):
+    _, address = view
+    show_page(tab, address)
+    return tab
+
+
+def numbers(text):
+    """Return the numbers with seven decimals in a text, without the spaces that align them."""
+    return sorted(re.findall(r'-?\d+\.\d{7}\b', text))
+
+
+def numbers_of_pose(chain, q):
+    """Return those that `leg_fk pose` prints."""
+    done = run_main('pose', chain, '--radians', *q)
+    return numbers(done.stdout)
+
+
+def test_each_joint_of_both_legs_has_a_slider(page):
+    for name in LEG_JOINTS:
+        assert slider(page, name).is_visible(), name
+
+
+def test_a_moved_slider_gives_the_numbers_of_pose_and_a_red_line(page):
+    knee = slider(page, 'l_knee')
+    knee.press('Home')
+    page.get_by_text('-150 deg is outside -124 .. 4 deg').wait_for()
+    q = [0.0, 0.0, 0.0, math.radians(-150), 0.0, 0.0]
+    left, right = (
+        numbers_of_pose('left_leg', q),
+        numbers_of_pose('right_leg', [0.0] * 6),
+    )
+    wait_until(
+        page, lambda: numbers(' '.join(copied_texts(page))) == sorted(left + right)
+    )
+    page.get_by_role('button', name='back to the start').click()
+    wait_until(page, lambda: knee.get_attribute('aria-valuenow') == '0')
+
+
+def test_every_step_of_the_method_changes_the_scene(page):
+    page.get_by_role('tab', name='Method').click()
+    before = still_picture(page)
+    for number, title in enumerate(STEPS, start=1):
+        slider(page, 'step').press('ArrowRight')
+        page.get_by_text(f'Step {number}. {title}').wait_for()
+        before = still_picture(page, other_than=before)
+    page.get_by_text('l_foot_dh_frame in root_link = T_Ro0 T_06 =').wait_for()
+
+
+def test_nothing_listens_but_this_machine(view):
+    process, address = view
+    ((host, port),) = listening_addresses(process.pid)
+    assert address == f'http://{host}:{port}/' == f'http://127.0.0.1:{port}/'
+
+
+def listening_addresses(pid):
+    """Return the TCP addresses at which a process listens, as Linux lists them."""
+    if not Path('/proc/net/tcp').exists():
+        pytest.skip('needs /proc of Linux')
+    sockets = set()
+    for descriptor in Path(f'/proc/{pid}/fd').iterdir():
+        sockets.add(str(descriptor.readlink()))
+    found = set()
+    for file in ('tcp', 'tcp6'):
+        for line in Path(f'/proc/{pid}/net/{file}').read_text().splitlines()[1:]:
+            words = line.split()
+            local, state, inode = words[1], words[3], words[9]
+            if state == _LISTENS and f'socket:[{inode}]' in sockets:
+                found.add(shown_address(*local.split(':')))
+    return found
+
+
+def shown_address(host, port):
+    """Return an address that the kernel prints as words of 32 bits in the machine's order."""
+    words = [bytes.fromhex(host[i : i + 8])[::-1] for i in range(0, len(host), 8)]
+    family = socket.AF_INET if len(words) == 1 else socket.AF_INET6
+    return socket.inet_ntop(family, b''.join(words)), int(port, 16)
+
+
+def test_a_recording_is_played_and_paused(tab):
+    with running_view('--recording', WALK) as (_, address):
+        page = show_page(tab, address)
+        time_line = slider(page, 'time [s]')
+        assert not slider(page, 'l_knee').is_visible()  # it follows
+        before = copied_texts(page)
+        page.get_by_role('button', name='play').click()
+        wait_until(page, lambda: copied_texts(page) != before)
+        page.get_by_role('button', name='pause').click()
+        page.get_by_role('button', name='play').wait_for()
+        assert 0.0 < float(time_line.get_attribute('aria-valuenow')) < 4.99
+        time_line.press('End')
+        last = np.genfromtxt(WALK, delimiter=',', names=True)[-1]
+        q = [float(last[name]) for name in LEG_JOINTS]
+        expected = numbers_of_pose('left_leg', q[:6]) + numbers_of_pose(
+            'right_leg', q[6:]
+        )
+        wait_until(
+            page, lambda: numbers(' '.join(copied_texts(page))) == sorted(expected)
+        )
+
+
+def test_the_page_is_opened_and_its_address_printed(monkeypatch):
+    pytest.importorskip('viser')
+    opened = []
+    monkeypatch.setenv('DISPLAY', ':0')
+    monkeypatch.setattr(webbrowser, 'open', opened.append)
+    monkeypatch.setattr(Viewer, 'run', lambda viewer: viewer.refresh())
+    with socket.socket() as taken:
+        taken.bind(('127.0.0.1', 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        done = run_main('view', '--port', port)
+    about, address = done.stdout.splitlines()
+    assert done.returncode == 0
+    assert (
+        about
+        == 'left_leg=v2_5, right_leg=v2_5 in root_link (x backward, y right, z up)'
+    )
+    assert address.split()[0] == opened[0] != f'http://127.0.0.1:{port}/'
+    assert f'note: port {port} is taken' in done.stderr
+
+
+def test_the_page_is_updated_at_most_30_times_a_second(monkeypatch):
+    pytest.importorskip('viser')
+    times = []
+
+    def refresh(viewer):
+        times.append(time.monotonic())
+        if len(times) == 7:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Viewer, 'refresh', refresh)
+    chain = load_chain('left_leg')
+    with running_server('127.0.0.1', 0) as server, pytest.raises(KeyboardInterrupt):
+        Viewer(server, [chain], LiveJoints([chain], 'joint_states')).run()
+    assert times[-1] - times[0] > 6 / 30 - 1e-3
+
+
+@pytest.mark.parametrize(
+    ('words', 'complaint'),
+    [
+        (['--host', '192.0.2.1'], "--host: found '192.0.2.1'"),
+        (['--port', '99999'], "found '99999', allowed: 1 to"),
+        (['--joint-topic', '/x'], '--joint-topic goes with --recording or --live'),
+        (['--recording', 'none.csv'], 'none.csv: there is no such file'),
+        (['--recording', 'a.csv', '--live'], 'not allowed with'),
+        (['left_leg=v3', 'right_leg=v1'], 'do not go together'),
+        (['left_legs'], "did you mean 'left_leg'?"),
+    ],
+)
+def test_mistakes_are_one_line(words, complaint):
+    pytest.importorskip('viser')
+    assert_one_line_complaint(run_main('view', *words), complaint)
+
+
+@pytest.mark.parametrize(
+    ('library', 'words', 'install'),
+    [('viser', [], 'pip install viser'), ('rclpy', ['--live'], 'source ROS 2')],
+)
+def test_a_missing_library_is_named_with_its_mend(monkeypatch, library, words, install):
+    monkeypatch.setitem(sys.modules, library, None)
+    done = run_main('view', *words)
+    assert_one_line_complaint(
+        done, f'needs {library}, which is not installed: {install}'
+    )
+
+
+def test_a_topic_with_no_such_name_is_refused():
+    pytest.importorskip('rclpy')
+    done = run_main('view', '--live', '--joint-topic', '/joint states')
+    assert_one_line_complaint(
+        done, "--joint-topic: found '/joint states'; topic name must not"
+    )
+
+
+def test_a_live_robot_moves_the_chains():
+    rclpy = pytest.importorskip('rclpy')
+    messages = pytest.importorskip('sensor_msgs.msg')
+    chain = load_chain('left_leg')
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    node = rclpy.create_node('robot', context=context)
+    publisher = node.create_publisher(messages.JointState, 'view_test/joint_states', 10)
+    deadline = time.monotonic() + 10.0
+    message = messages.JointState(
+        name=['other', *chain.joint_names], position=[9.0, *BENT]
+    )
+    with live_joints([chain], 'view_test/joint_states') as live:
+        assert live.postures()[0].q is None
+        while live.postures()[0].q is None and time.monotonic() < deadline:
+            publisher.publish(message)
+            time.sleep(0.02)
+        assert live.postures() == [Posture(tuple(BENT))]
+    context.try_shutdown()
+
+
+# What is drawn, and said, without a page.
+
+FILES = {'panda': EXAMPLES / 'panda.yaml', 'arm': EXAMPLES / 'cylindrical_arm.yaml'}
+
+each_kind = pytest.mark.parametrize('name', ['left_leg', 'right_leg', 'panda', 'arm'])
+
+
+def example(name):
+    """Return a chain: standard, modified, or with slides."""
+    return load_chain(name, file=FILES.get(name))
+
+
+@settings(max_examples=25)
+@given(chains_and_positions())
+def test_a_row_leads_from_frame_to_frame_along_z_and_the_common_normal(
+    chain_and_positions,
+):
+    chain, (q, *_) = chain_and_positions
+    posed = PosedChain(chain, q)
+    method = Method(posed, 1.0)
+    for row in range(len(chain.rows())):
+        geometry = method.geometry(row)
+        before, after = posed.frames[row], posed.frames[row + 1]
+        path = np.vstack((geometry.d_ends, geometry.a_ends))
+        np.testing.assert_allclose(
+            path[[0, 3]], [before[:3, 3], after[:3, 3]], atol=1e-12
+        )
+        np.testing.assert_allclose(path[1], path[2], atol=1e-12)
+        np.testing.assert_allclose(
+            path[1] - path[0], geometry.d * before[:3, 2], atol=1e-12
+        )
+        np.testing.assert_allclose(
+            path[3] - path[2], geometry.a * after[:3, 0], atol=1e-12
+        )
+        for axis in (before[:3, 2], after[:3, 2]):
+            assert abs(geometry.x @ axis) < 1e-12  # the normal is common to both
+        x = turns_about(geometry.z, geometry.theta) @ before[:3, 0]
+        z = turns_about(geometry.x, geometry.alpha) @ before[:3, 2]
+        np.testing.assert_allclose([x, z], [after[:3, 0], after[:3, 2]], atol=1e-12)
+
+
+def test_a_row_of_a_modified_table_has_its_normal_first():
+    chain = example('panda')
+    q = [0.3, -0.5, 0.2, -1.5, 0.4, 1.2, 0.6]
+    posed = PosedChain(chain, q)
+    for row, (before, after) in enumerate(zip(posed.frames[:-2], posed.frames[1:-1])):
+        geometry = Method(posed, 1.0).geometry(row)
+        path = np.vstack((geometry.a_ends, geometry.d_ends))
+        np.testing.assert_allclose(
+            path[[0, 3]], [before[:3, 3], after[:3, 3]], atol=1e-12
+        )
+        np.testing.assert_allclose(
+            path[1] - path[0], geometry.a * before[:3, 0], atol=1e-12
+        )
+        np.testing.assert_allclose(
+            path[3] - path[2], geometry.d * after[:3, 2], atol=1e-12
+        )
+
+
+@each_kind
+def test_each_step_draws_what_it_is_about(name):
+    chain = example(name)
+    method = Method(PosedChain(chain, [0.3] * chain.n), 1.0)
+    scenes = [set(method.scene(step, 0)) for step in range(1, 7)]
+    for letter, step in (('z', 1), ('x', 3), ('y', 4)):
+        assert [f'method/{letter} axes' in scene for scene in scenes[:4]] == [
+            number >= step for number in range(1, 5)
+        ]
+    has_origins = ['method/origins' in scene for scene in scenes]
+    assert has_origins == [False, True, True, True, False, False]
+    assert {'method/two frames', 'method/theta_0'} <= scenes[4]
+    assert 'method/tip' in scenes[5]
+
+
+@each_kind
+def test_the_product_is_the_pose_in_mm(name):
+    chain = example(name)
+    q = [0.3] * chain.n
+    lines = Method(PosedChain(chain, q), 1.0).lines(6, 0)
+    shown = [list(map(float, line[1:-1].split())) for line in lines[-4:]]
+    expected = chain.forward(q)
+    expected[:3, 3] *= 1000
+    np.testing.assert_allclose(shown, expected, atol=5.1e-5)
+
+
+@each_kind
+def test_the_steps_have_the_numbers_of_explain(name):
+    chain = example(name)
+    q = [0.3] * chain.n
+    file = ['-k', FILES[name]] if name in FILES else []
+    explained = run_main('explain', name, *file, '--radians', *q).stdout
+    method = Method(PosedChain(chain, q), 1.0)
+    said = '\n'.join(line for step in range(1, 5) for line in method.lines(step, 0))
+    vectors = named_vectors(said)
+    assert len(vectors) == 4 * len(method.frames)
+    assert vectors.items() <= named_vectors(explained).items()
+    for line in method.lines(6, 0)[-4:]:
+        assert line.split() in [printed.split() for printed in bracketed(explained)]
+
+
+def named_vectors(text):
+    """Return vectors such as `z_2 = (0 0.1736 0.9848)` by their names."""
+    found = re.findall(r'^ *([zoxy]_\d+) *=? *\(([^)]*)\)', text, re.MULTILINE)
+    return {name: tuple(numbers.split()) for name, numbers in found}
+
+
+def bracketed(text):
+    """Return the rows of the matrices in a text."""
+    return re.findall(r'\[[^][]*\]', text)
+
+
+@each_kind
+def test_the_rows_multiply_to_the_table(name):
+    chain = example(name)
+    posed = PosedChain(chain, [0.3] * chain.n)
+    T = np.eye(4)
+    for row in range(len(chain.rows())):
+        lines = Method(posed, 1.0).lines(5, row)
+        T = T @ [list(map(float, line[1:-1].split())) for line in lines[-4:]]
+    expected = np.linalg.inv(posed.frames[0]) @ posed.frames[-2]
+    expected[:3, 3] *= 1000
+    np.testing.assert_allclose(T, expected, atol=0.5)  # of factors with four decimals
+
+
+def test_the_steps_say_what_a_student_reads():
+    method = Method(PosedChain(load_chain('left_leg'), BENT), 1.0)
+    said = [method.lines(step, 3) for step in range(1, 6)]
+    assert 'z_2  ( 0        0.1736   0.9848)  l_hip_yaw turns' in said[0]
+    assert any(line.endswith('200.5 from z_3, parallel') for line in said[1])
+    assert any(line.endswith('meets z_0') for line in said[1])
+    assert said[2][1].endswith('orthogonal to z_0, z_1')
+    assert 'theta_3  = 90 - 30 = 60 deg  about z_3, x_3 to x_4' in said[4]
+
+
+@given(st.floats(-20, 20), st.floats(-3, 3))
+def test_an_arc_ends_where_the_angle_leads(angle, direction):
+    axis = np.array([0.0, math.sin(direction), math.cos(direction)])
+    points = arc(np.ones(3), axis, np.array([0.1, 0.0, 0.0]), angle)
+    turned = max(-2 * math.pi, min(2 * math.pi, angle))
+    np.testing.assert_allclose(points[0], [1.1, 1.0, 1.0])
+    np.testing.assert_allclose(
+        points[-1], 1.0 + turns_about(axis, turned) @ [0.1, 0.0, 0.0], atol=1e-12
+    )
+
+
+def test_names_at_one_place_share_a_label():
+    places = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1e-9, 0.0]])
+    assert [label.text for label in labels('x', 'abc', places, 1.0).values()] == [
+        'a, c',
+        'b',
+    ]
+
+
+def test_forward_is_against_x_where_x_points_backward():
+    forward, left, up = directions(('backward', 'right', 'up'))
+    np.testing.assert_array_equal([forward, left, up], np.diag([-1, -1, 1]))
+
+
+LOWER = st.one_of(st.just(-math.inf), st.floats(-6, 6))
+UPPER = st.one_of(st.just(math.inf), st.floats(-6, 6))
+
+
+@given(LOWER, UPPER, st.sampled_from(['revolute', 'prismatic']))
+def test_a_slider_goes_a_fifth_beyond_its_range(lower, upper, joint_type):
+    lower, upper = min(lower, upper), max(lower, upper)
+    link = DHLink(0.0, 0.0, 0.0, joint_type=joint_type, lower=lower, upper=upper)
+    low, high = slider_bounds(link)
+    unit, rounding = (1.0, 0.01) if link.is_prismatic else (180 / math.pi, 1.0)
+    if math.isfinite(upper - lower):
+        margin = 0.2 * (upper - lower)
+        assert low == pytest.approx((lower - margin) * unit, abs=rounding)
+        assert high == pytest.approx((upper + margin) * unit, abs=rounding)
+    assert low <= slider_start(link) <= high
+
+
+@given(st.floats(-3.1, 3.1), st.floats(-1.57, 1.57), st.floats(-3.1, 3.1))
+def test_angles_turn_back_into_the_rotation(roll, pitch, yaw):
+    R = rotation(roll, pitch, yaw)
+    np.testing.assert_allclose(roll_pitch_yaw(R), [roll, pitch, yaw], atol=1e-6)
+
+
+@pytest.mark.parametrize('pitch', [-math.pi / 2, math.pi / 2])
+def test_angles_have_no_yaw_where_any_would_do(pitch):
+    R = rotation(0.4, pitch, 0.7)
+    roll, _, yaw = roll_pitch_yaw(R)
+    assert yaw == 0.0
+    np.testing.assert_allclose(rotation(roll, pitch, yaw), R, atol=1e-12)
+
+
+def rotation(roll, pitch, yaw):
+    x, y, z = np.eye(3)
+    return turns_about(z, yaw) @ turns_about(y, pitch) @ turns_about(x, roll)
+
+
+def test_a_recording_shows_the_newest_sample_and_how_old_it_is():
+    chain = Chain(
+        'slide',
+        '',
+        'root',
+        'tip',
+        ('x',),
+        (DHLink(0.0, 0.0, 0.0, joint_type='prismatic'),),
+        np.eye(4),
+    )
+    times = np.array([1.0, 3.0, 2.0])  # the clock was set
+    track = RecordedChain(chain, times, np.array([[0.1], [0.3], [0.2]]))
+    assert track.posture(0.5) == (None, 'no pose yet')
+    assert track.posture(2.4) == ([0.2], '')
+    assert track.posture(4.0) == ([0.3], 'no pose for 1.0 s')
+    np.testing.assert_allclose(track.trail(3.5)[:, 2], [0.2, 0.3])

@@ -1,0 +1,263 @@
+"""The robot's description, sent by another process: computed with, or held against the tables."""
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from icub_leg_fk import load_chain
+from icub_leg_fk.kinematics.difference import postures
+import numpy as np
+import pytest
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import String
+from support.described_robots import (
+    needs_real_robots,
+    own_description,
+    pinocchio_pose,
+    REAL,
+)
+from support.node_harness import BOTH, FEET, LEFT, LOSSLESS, NodeProcess, Robot, SECOND
+from support.node_oracle import oracle_pose, pose_matrix
+from support.robots import joint as a_joint
+from support.robots import robot as robot_of
+
+OK, WARN, ERROR, STALE = (
+    DiagnosticStatus.OK,
+    DiagnosticStatus.WARN,
+    DiagnosticStatus.ERROR,
+    DiagnosticStatus.STALE,
+)
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+Q = [0.2, 0.1, -0.1, -0.5, -0.3, 0.1, 0.15, 0.05, 0.1, -0.4, -0.2, -0.1]
+CRANE = robot_of([a_joint(0), a_joint(1)])
+GOOD = own_description('v2_5')
+
+
+class DescribedRobot(Robot):
+    """A robot that also sends descriptions of itself, and reads what the node says."""
+
+    def __init__(self, node):
+        super().__init__(node)
+        self.descriptions = self.node.create_publisher(
+            String, 'robot_description', LATCHED
+        )
+        self.topic = f'{node.namespace}/robot_description'
+        self.wait_for_log = node.wait_for_log
+        self._log = node.log
+        self._stamp = SECOND
+
+    def describe(self, text):
+        self.descriptions.publish(String(data=text))
+
+    def poses_now(self):
+        """Return the (4, 4) poses of both feet that answer a joint state."""
+        self._stamp = self.connect(self._stamp) + 1000
+        self.send(self._stamp, BOTH, Q)
+        return [
+            pose_matrix(self.take(self.poses[tip], self._stamp)[-1].pose)
+            for tip in FEET
+        ]
+
+    def send_now(self, joint_prefix=''):
+        names = [joint_prefix + name for name in BOTH]
+        self.send(self.node.get_clock().now().nanoseconds, names, Q)
+
+    def wait_for_status(self, level, words):
+        """Wait until the left leg's status has this level and these words."""
+
+        def is_so(statuses):
+            status = statuses['left_leg']
+            return status.level == level and words in status.message
+
+        self.statuses(is_so, meanwhile=self.send_now)
+
+    def wait_for_value(self, words):
+        """Wait until the left leg's status says this of the description."""
+        self.statuses(
+            lambda statuses: words in statuses['left_leg'].values['description'],
+            meanwhile=self.send_now,
+        )
+
+    def said(self, severity):
+        """Return what the node has said, from the text on."""
+        marked = [line for line in self._log().splitlines() if f'[{severity}]' in line]
+        return [line.partition('foot_pose_publisher]: ')[2] for line in marked]
+
+
+def assert_poses(found, text, tips=('l_foot_dh_frame', 'r_foot_dh_frame')):
+    """Check the poses of both feet against Pinocchio's of a description."""
+    positions = dict(zip(BOTH, Q, strict=True))
+    for pose, tip in zip(found, tips, strict=True):
+        expected = pinocchio_pose(text, 'root_link', tip, positions)
+        np.testing.assert_allclose(pose, expected, rtol=0, atol=1e-9)
+
+
+def mm_between_versions():
+    """Return how far the left foot of v1 is from that of v2_5, by the printed tables [mm]."""
+    positions = postures(load_chain('left_leg', 'v2_5'), 100)
+    off = []
+    for q in np.array([positions[joint] for joint in LEFT]).T:
+        one, other = [oracle_pose('left_leg', version, q) for version in ('v1', 'v2_5')]
+        off.append(1000 * np.linalg.norm(one[:3, 3] - other[:3, 3]))
+    return max(off)
+
+
+@pytest.fixture(scope='module')
+def waiting():
+    """Return a robot whose node computes with the description that it sends."""
+    with (
+        NodeProcess({'description_from_topic': True, **LOSSLESS}) as node,
+        DescribedRobot(node) as robot,
+    ):
+        yield robot
+
+
+@pytest.fixture
+def described(waiting):
+    """Return that robot, once it has sent a good description."""
+    waiting.describe(GOOD)
+    waiting.wait_for_value('robot_v2_5')
+    return waiting
+
+
+def test_it_waits_aloud(waiting):
+    waiting.wait_for_log(
+        'waiting for the description of the robot on '
+        f'{waiting.topic} to publish poses of left_leg, right_leg'
+    )
+    silence = (
+        f'no description of the robot has come on {waiting.topic}; it has 1 publisher'
+    )
+    waiting.wait_for_status(STALE, silence)
+    waiting.wait_for_log(silence)
+    assert not waiting.left
+    result = waiting.change(version='v1')
+    assert not result.successful
+    assert (
+        "version: found 'v1', allowed with description_from_topic: none"
+        in result.reason
+    )
+
+
+def test_poses_are_those_of_the_description_and_a_new_one_takes_effect(described):
+    assert_poses(described.poses_now(), GOOD)
+    other = own_description('v1')
+    described.describe(other)
+    described.wait_for_value('robot_v1')
+    poses = described.poses_now()
+    assert_poses(poses, other)
+    np.testing.assert_allclose(
+        poses[0], oracle_pose('left_leg', 'v1', Q[:6]), rtol=0, atol=1e-9
+    )
+    said = described.said('INFO')
+    assert any('(left_leg=urdf, root_link to l_foot_dh_frame)' in line for line in said)
+    for name in ('robot_v2_5', 'robot_v1'):
+        assert f'computing with the description of {name} on {described.topic}' in said
+
+
+@needs_real_robots
+@pytest.mark.parametrize('name', ['iCubGenova04', 'iCubGenova09'])
+def test_poses_of_real_robots(described, name):
+    text = REAL[name].read_text()
+    assert described.change(foot_frame='sole').successful
+    described.describe(text)
+    described.wait_for_value('iCub')
+    assert_poses(described.poses_now(), text, ('l_sole', 'r_sole'))
+    assert described.change(foot_frame='dh').successful
+
+
+@pytest.mark.parametrize(
+    ('bad', 'fault'),
+    [
+        (GOOD[: len(GOOD) // 2], 'robot_description:'),
+        ('', 'robot_description:'),
+        (CRANE, "unknown chain 'left_leg'; known: l2"),
+        (own_description('v2_5', 'left_leg'), "unknown chain 'right_leg'"),
+    ],
+    ids=['half', 'empty', 'another robot', 'one leg'],
+)
+def test_one_that_cannot_be_used_changes_nothing(described, bad, fault):
+    errors = len(described.said('ERROR'))
+    described.describe(bad)
+    described.wait_for_status(ERROR, 'description of the robot not used')
+    (error,) = described.said('ERROR')[errors:]
+    assert fault in error
+    assert error.endswith('; the one before stays')
+    assert_poses(described.poses_now(), GOOD)
+    described.describe(GOOD)
+    described.wait_for_status(OK, 'publishing')
+
+
+def test_a_second_publisher_is_a_warning(described):
+    namespace = described.node.get_namespace()
+    other = Node('other', namespace=namespace, context=described.node.context)
+    other.create_publisher(String, 'robot_description', LATCHED)
+    described.wait_for_status(
+        WARN,
+        f'{described.topic} has 2 publishers, and the last '
+        f'description counts: {namespace}/other, {namespace}/robot',
+    )
+    other.destroy_node()
+
+
+@pytest.fixture(scope='module')
+def with_tables():
+    """Return a robot whose node computes with tables, and looks for joints under a prefix."""
+    with (
+        NodeProcess({'joint_prefix': 'icub1/', **LOSSLESS}) as node,
+        DescribedRobot(node) as robot,
+    ):
+        yield robot
+
+
+def test_tables_are_held_against_the_description(with_tables):
+    robot = with_tables
+    robot.describe(GOOD)
+    robot.wait_for_log(
+        "right_leg: r_foot_dh_frame is up to 0.00 mm and 0.00 deg off the robot's"
+    )
+    robot.describe(own_description('v1'))
+    off = f'_foot_dh_frame is up to {mm_between_versions():.2f} mm and 0.00 deg off the robot'
+    robot.wait_for_log(f'right_leg: r{off}')
+    way = f"'s own; description_from_topic:=true computes with the description on {robot.topic}"
+    robot.wait_for_log(way)
+    assert [line for line in robot.said('WARN') if way in line] == [
+        f'left_leg: l{off}{way}',
+        f'right_leg: r{off}{way}',
+    ]
+    assert robot.change(version='v1').successful
+    robot.wait_for_value('l_foot_dh_frame is up to 0.00 mm')
+    assert robot.change(version='').successful
+
+
+def test_a_difference_from_the_description_changes_no_level(with_tables):
+    with_tables.describe(own_description('v1'))
+    far = f'up to {mm_between_versions():.2f} mm'
+
+    def are_compared(statuses):
+        status = statuses['left_leg']
+        return far in status.values['description'] and status.level == OK
+
+    with_tables.statuses(are_compared, meanwhile=lambda: with_tables.send_now('icub1/'))
+
+
+def test_joint_names_without_the_prefix_are_explained(with_tables):
+    with_tables.wait_for_status(
+        ERROR, '; \'l_hip_pitch\' is looked for with joint_prefix:=""'
+    )
+
+
+def test_a_urdf_is_a_kinematics_file(tmp_path):
+    robots, parameters = tmp_path / 'robot.urdf', tmp_path / 'parameters.yaml'
+    robots.write_text(GOOD)
+    parameters.write_text('/**: {ros__parameters: {root_frame: odom}}')
+    with (
+        NodeProcess(
+            {'kinematics_file': str(robots), **LOSSLESS},
+            ['--params-file', str(parameters)],
+        ) as node,
+        DescribedRobot(node) as robot,
+    ):
+        assert_poses(robot.poses_now(), GOOD)
+        [warning] = robot.said('WARN')
+    assert warning.startswith(
+        f"root_frame not used: unknown link of {robots} 'odom'; known: "
+    )
