@@ -204,7 +204,9 @@ def _tasks_of_directory(
     try:
         Path(directory).mkdir(exist_ok=True)
     except OSError as error:
-        raise OutputFileError(directory, f'cannot be made: {error.strerror}') from error
+        raise OutputFileError(
+            directory, f'cannot be made: {str(error.strerror).lower()}'
+        ) from error
     endings = {name: ending for ending, name in STORAGES.items()}
     sources: dict[str, str] = {}  # by target
     for bag in bags:

@@ -40,25 +40,61 @@ _SPANS_SHOWN = 4
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument('recordings', metavar='RECORDING', nargs='+',
-                        help='bag, CSV file or directory of yarpdatadumper')
-    options.add_output(parser, 'picture to write, .png, .svg or .pdf (default: the name of '
-                       'RECORDING with .png, in this directory)')
-    parser.add_argument('--over', metavar='RECORDING', nargs='+', default=(),
-                        help='another recording, over which the first is drawn')
-    parser.add_argument('--orientation', action='store_true',
-                        help='also draw roll, pitch and yaw, which turn a tip from its '
-                             'orientation at q = 0 about the axes of the root')
-    options.add(parser, '--chains', '--version', '--foot-frame', '--joint-topic', '--time-unit',
-                '--kinematics-file')
-    parser.add_argument('--at', metavar='T[,T...]', type=_times,
-                        help=f'up to {_INSTANTS} times [s] at which to draw the legs (default: '
-                             'where one foot is highest above the other, or farthest ahead)')
+    parser.add_argument(
+        'recordings',
+        metavar='RECORDING',
+        nargs='+',
+        help='bag, CSV file or directory of yarpdatadumper',
+    )
+    options.add_output(
+        parser,
+        'picture to write, .png, .svg or .pdf (default: the name of '
+        'RECORDING with .png, in this directory)',
+    )
+    parser.add_argument(
+        '--over',
+        metavar='RECORDING',
+        nargs='+',
+        default=(),
+        help='another recording, over which the first is drawn',
+    )
+    parser.add_argument(
+        '--orientation',
+        action='store_true',
+        help='also draw roll, pitch and yaw, which turn a tip from its '
+        'orientation at q = 0 about the axes of the root',
+    )
+    options.add(
+        parser,
+        '--chains',
+        '--version',
+        '--foot-frame',
+        '--joint-topic',
+        '--time-unit',
+        '--kinematics-file',
+    )
+    parser.add_argument(
+        '--at',
+        metavar='T[,T...]',
+        type=_times,
+        help=f'up to {_INSTANTS} times [s] at which to draw the legs (default: '
+        'where one foot is highest above the other, or farthest ahead)',
+    )
     time = options.number_between(-_LONGEST_TIME, _LONGEST_TIME, 'a time in seconds')
-    parser.add_argument('--from', dest='begin', metavar='T', type=time,
-                        help='draw only from this time [s] (default: the first pose)')
-    parser.add_argument('--to', dest='end', metavar='T', type=time,
-                        help='draw only to this time [s] (default: the last pose)')
+    parser.add_argument(
+        '--from',
+        dest='begin',
+        metavar='T',
+        type=time,
+        help='draw only from this time [s] (default: the first pose)',
+    )
+    parser.add_argument(
+        '--to',
+        dest='end',
+        metavar='T',
+        type=time,
+        help='draw only to this time [s] (default: the last pose)',
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -69,23 +105,47 @@ def run(args: argparse.Namespace) -> int:
     chains = options.chains_of_one_root(args)
     with shown_progress(name) as progress:
         tracks = _tracks(args.recordings, chains, args, _part(progress, 0.0))
-        over = _tracks(args.over, chains, args, _part(progress, 0.5)) if args.over else []
-        instants = _checked_instants(args.at, tracks) if args.at else default_instants(tracks)
+        over = (
+            _tracks(args.over, chains, args, _part(progress, 0.5)) if args.over else []
+        )
+        instants = (
+            _checked_instants(args.at, tracks) if args.at else default_instants(tracks)
+        )
         title = _title(args.recordings, tracks)
         if over:
             title += f'   over   {_title(args.over, over)}'
-        save_picture(lambda: feet_figure(
-            tracks, instants, title, over=over, over_name=_shown(args.over),
-            orientation=args.orientation), output, force=args.force)
+        save_picture(
+            lambda: feet_figure(
+                tracks,
+                instants,
+                title,
+                over=over,
+                over_name=_shown(args.over),
+                orientation=args.orientation,
+            ),
+            output,
+            force=args.force,
+        )
     print(f'{output}: {", ".join(map(_pose_count, tracks))}')
     return 0
 
 
-def _tracks(recordings: Sequence[str], chains: Sequence[Chain], args: argparse.Namespace,
-            progress: Progress | None) -> list[ChainTrack]:
+def _tracks(
+    recordings: Sequence[str],
+    chains: Sequence[Chain],
+    args: argparse.Namespace,
+    progress: Progress | None,
+) -> list[ChainTrack]:
     """Return what the chains did, and print what there is to say of it."""
-    reading = read_tracks(recordings, chains, args.joint_topics, progress,
-                          time_unit=args.time_unit, begin=args.begin, end=args.end)
+    reading = read_tracks(
+        recordings,
+        chains,
+        args.joint_topics,
+        progress,
+        time_unit=args.time_unit,
+        begin=args.begin,
+        end=args.end,
+    )
     options.print_notes(reading.warnings, reading.notes)
     return reading.tracks
 
@@ -131,14 +191,18 @@ def _extreme_near(times: Array, distance: Array, near: float) -> float:
     return float(like[np.abs(like - near).argmin()])
 
 
-def _checked_instants(instants: Sequence[float], tracks: Sequence[ChainTrack]) -> list[float]:
+def _checked_instants(
+    instants: Sequence[float], tracks: Sequence[ChainTrack]
+) -> list[float]:
     """Return the times of the samples that are nearest to some times, in order [s]."""
     found = []
     for instant in instants:
         there = [track for track in tracks if track.covers(instant)]
         if not there:
-            raise LegFKError(f'--at: found {instant:g} s, where there is no pose; allowed: '
-                             f'{_spans(tracks)}')
+            raise LegFKError(
+                f'--at: found {instant:g} s, where there is no pose; allowed: '
+                f'{_spans(tracks)}'
+            )
         found.append(float(there[0].times[there[0].nearest(instant)]))
     return sorted(set(found))
 
@@ -155,8 +219,10 @@ def _spans(tracks: Sequence[ChainTrack]) -> str:
 def _times(text: str) -> list[float]:
     times = [options.number(word) for word in text.split(',')]
     if len(times) > _INSTANTS or not all(map(math.isfinite, times)):
-        raise argparse.ArgumentTypeError(f'found {text.strip()!r}, allowed: up to {_INSTANTS} '
-                                         'times in seconds, separated by commas')
+        raise argparse.ArgumentTypeError(
+            f'found {text.strip()!r}, allowed: up to {_INSTANTS} '
+            'times in seconds, separated by commas'
+        )
     return times
 
 
@@ -176,7 +242,9 @@ def _shown(recordings: Sequence[str]) -> str:
     """Return the name of a recording as a picture can show it."""
     if not recordings:
         return ''
-    shown = os.fsencode(_name(recordings)).decode(errors='backslashreplace')  # it may be no text
+    shown = os.fsencode(_name(recordings)).decode(
+        errors='backslashreplace'
+    )  # it may be no text
     if len(shown) > _LONGEST_NAME:
         shown = f'{shown[:_LONGEST_NAME]}...'
     others = len(recordings) - 1

@@ -9,7 +9,13 @@ import sys
 from icub_leg_fk.errors import OutputFileError
 from icub_leg_fk.tools import options
 from icub_leg_fk.tools.output_file import check_target, STANDARD_OUTPUT, whole_path
-from icub_leg_fk.tools.pose_table import column_names, CsvTable, NpzTable, PoseTable, Sink
+from icub_leg_fk.tools.pose_table import (
+    column_names,
+    CsvTable,
+    NpzTable,
+    PoseTable,
+    Sink,
+)
 from icub_leg_fk.tools.progress import shown_progress
 from icub_leg_fk.tools.recording import follow, open_recording, warnings_of
 
@@ -31,13 +37,29 @@ _FORMATS = ('.csv', '.npz')
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument('recordings', metavar='RECORDING', nargs='+',
-                        help='bag, CSV file or directory of yarpdatadumper')
-    options.add_output(parser, 'file to write, .csv or .npz (default: CSV to standard output)')
-    options.add(parser, '--chains', '--version', '--foot-frame', '--joint-topic', '--time-unit',
-                '--kinematics-file')
-    parser.add_argument('--twist', action='store_true',
-                        help='also vx, vy, vz [m/s], wx, wy, wz [rad/s], from joint velocities')
+    parser.add_argument(
+        'recordings',
+        metavar='RECORDING',
+        nargs='+',
+        help='bag, CSV file or directory of yarpdatadumper',
+    )
+    options.add_output(
+        parser, 'file to write, .csv or .npz (default: CSV to standard output)'
+    )
+    options.add(
+        parser,
+        '--chains',
+        '--version',
+        '--foot-frame',
+        '--joint-topic',
+        '--time-unit',
+        '--kinematics-file',
+    )
+    parser.add_argument(
+        '--twist',
+        action='store_true',
+        help='also vx, vy, vz [m/s], wx, wy, wz [rad/s], from joint velocities',
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -49,17 +71,23 @@ def run(args: argparse.Namespace) -> int:
     name = Path(args.recordings[0]).name
     with (
         shown_progress(name) as progress,
-        open_recording(args.recordings, chains, args.joint_topics, args.time_unit) as recording,
+        open_recording(
+            args.recordings, chains, args.joint_topics, args.time_unit
+        ) as recording,
         _sink(args.output, columns, args.force) as sink,
     ):
         table = PoseTable(chains, args.twist, sink)
-        look = follow(recording, chains, table.take, velocities=args.twist, progress=progress)
+        look = follow(
+            recording, chains, table.take, velocities=args.twist, progress=progress
+        )
         table.finish()
         poseless = [name for name, count in table.counts.items() if not count]
         warnings = warnings_of(recording, look, poseless)
     options.print_notes(warnings, recording.notes)
     if args.output not in (None, STANDARD_OUTPUT):
-        counts = ', '.join(f'{table.counts[chain.name]} poses of {chain.tip}' for chain in chains)
+        counts = ', '.join(
+            f'{table.counts[chain.name]} poses of {chain.tip}' for chain in chains
+        )
         print(f'{args.output}: {table.rows} rows, {counts}')
     return 0
 
@@ -85,5 +113,6 @@ def _check_output(output: str, force: bool) -> None:
     check_target(output, force=force)
     ending = Path(output).suffix
     if ending not in _FORMATS:
-        raise OutputFileError(output, f'found {ending or "no ending"}, allowed: '
-                                      f'{", ".join(_FORMATS)}')
+        raise OutputFileError(
+            output, f'found {ending or "no ending"}, allowed: {", ".join(_FORMATS)}'
+        )

@@ -46,7 +46,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add(parser, '--version', '--foot-frame', '--kinematics-file')
     source = parser.add_mutually_exclusive_group()
     source.add_argument(
-        '--recording', metavar='FILE', type=Path, help='play a bag, a CSV file or a log of YARP'
+        '--recording',
+        metavar='FILE',
+        type=Path,
+        help='play a bag, a CSV file or a log of YARP',
     )
     source.add_argument(
         '--live',

@@ -14,7 +14,12 @@ import re
 import time
 from typing import Any
 
-from icub_leg_fk.errors import InputFileError, LegFKError, OutputFileError, ParameterError
+from icub_leg_fk.errors import (
+    InputFileError,
+    LegFKError,
+    OutputFileError,
+    ParameterError,
+)
 from icub_leg_fk.kinematics import Catalog, Chain
 from icub_leg_fk.stream.configuration import (
     Configuration,
@@ -243,7 +248,9 @@ class _NoBag:
                 msgdef=rosbags.interfaces.MessageDefinition(form, text),
                 digest=types.hash_rihs01(JOINT_STATE),
                 msgcount=0,
-                ext=rosbags.interfaces.ConnectionExtRosbag2('cdr', [reliable_qos(_POSE_DEPTH)]),
+                ext=rosbags.interfaces.ConnectionExtRosbag2(
+                    'cdr', [reliable_qos(_POSE_DEPTH)]
+                ),
                 owner=None,
             )
         ]
@@ -353,7 +360,9 @@ class _OldPoses:
                 self._look_for_frames(bag, connection, types)
         self.notes = [f'left out: {each} of the recording' for each in self.found]
 
-    def _look_for_frames(self, bag: Bag | _NoBag, connection: Connection, types: _Types) -> None:
+    def _look_for_frames(
+        self, bag: Bag | _NoBag, connection: Connection, types: _Types
+    ) -> None:
         sought = {frame.encode() + b'\0': frame for frame in self.frames}
         found: set[str] = set()
         for _, _, data in bag.messages([connection]):
@@ -373,7 +382,9 @@ class _Copy:
         connections: those of the new recording, by the ids of the old ones.
     """
 
-    def __init__(self, writer: Any, bag: Bag | _NoBag, old: _OldPoses, types: _Types) -> None:
+    def __init__(
+        self, writer: Any, bag: Bag | _NoBag, old: _OldPoses, types: _Types
+    ) -> None:
         for name, value in bag.custom_data.items():
             writer.set_custom_data(name, str(value))
         self.count = 0
@@ -482,7 +493,9 @@ def _run(
 
 
 @contextmanager
-def _open(path: Path, chains: Sequence[Chain], time_unit: str) -> Iterator[Bag | _NoBag]:
+def _open(
+    path: Path, chains: Sequence[Chain], time_unit: str
+) -> Iterator[Bag | _NoBag]:
     """Give a recording for reading, as a bag or like one."""
     parts = parts_without_topics(path, chains, time_unit)
     if parts:
@@ -499,10 +512,15 @@ def _namespace(namespace: str | None, topics: Sequence[str]) -> str:
         ParameterError: it is no name of ROS.
     """
     if namespace is None:
-        return os.path.commonpath([os.path.dirname(topic) for topic in topics]).rstrip('/')
+        return os.path.commonpath([os.path.dirname(topic) for topic in topics]).rstrip(
+            '/'
+        )
     if not _NAMESPACE.fullmatch(namespace):
-        raise ParameterError('namespace', f'found {namespace!r}, allowed: words of letters, '
-                                          'digits and underscores, separated by slashes')
+        raise ParameterError(
+            'namespace',
+            f'found {namespace!r}, allowed: words of letters, '
+            'digits and underscores, separated by slashes',
+        )
     words = namespace.strip('/')
     return f'/{words}' if words else ''
 

@@ -25,6 +25,7 @@ from icub_leg_fk.errors import (
     OutputFileError,
 )
 from icub_leg_fk.stream.cdr import read_layout
+from icub_leg_fk.tools.input_file import first_bytes
 from icub_leg_fk.tools.output_file import is_bag, whole_path
 from icub_leg_fk.tools.progress import Progress
 import yaml
@@ -179,7 +180,9 @@ class Bag:
 
     def joint_topics(self) -> list[str]:
         """Return the topics of joint states."""
-        return sorted({each.topic for each in self.connections if each.msgtype == JOINT_STATE})
+        return sorted(
+            {each.topic for each in self.connections if each.msgtype == JOINT_STATE}
+        )
 
     def messages(
         self, connections: Iterable[Connection], progress: Progress | None = None
@@ -368,7 +371,7 @@ def _refuse_other_recordings(path: Path) -> None:
             str(path),
             'is a compressed file alone; give its directory, or decompress it: zstd -d',
         )
-    elif _first_bytes(path, 7) == b'#ROSBAG':
+    elif first_bytes(path, 7) == b'#ROSBAG':
         raise InputFileError(
             str(path), 'is a ROS 1 bag; `rosbags-convert` makes a ROS 2 recording of it'
         )
@@ -439,7 +442,7 @@ def _encodings_of_other_mcap(file: Path) -> dict[str, str]:
 
     rosbags tells no more of such a file than that its profile is another.
     """
-    head = _first_bytes(file, 4096)
+    head = first_bytes(file, 4096)
     profile_end = 21 + int.from_bytes(head[17:21], 'little')
     profile = head[21:profile_end]
     if profile == b'ros2' or not head.startswith(b'\x89MCAP0\r\n'):
@@ -452,11 +455,6 @@ def _encodings_of_other_mcap(file: Path) -> dict[str, str]:
         topic.decode(): encoding.decode()
         for topic, encoding in _MCAP_TOPIC.findall(tail)
     }
-
-
-def _first_bytes(file: Path, count: int) -> bytes:
-    with file.open('rb') as stream:
-        return stream.read(count)
 
 
 def _clean_path(path: Path, scratch: Path) -> Path:

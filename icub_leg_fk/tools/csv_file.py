@@ -17,9 +17,10 @@ from typing import NamedTuple
 
 from icub_leg_fk.errors import InputFileError
 from icub_leg_fk.kinematics import Chain
+from icub_leg_fk.tools.input_file import first_bytes, lines_of
 from icub_leg_fk.tools.joint_states import JointStateEncoder, Messages, Part, SECOND
 from icub_leg_fk.tools.options import LARGEST, number
-from icub_leg_fk.tools.progress import lines_of, Progress
+from icub_leg_fk.tools.progress import Progress
 
 ENDINGS = ('.csv', '.tsv', '.txt')
 TIME_UNITS = {'s': SECOND, 'ms': 1_000_000, 'us': 1000, 'ns': 1}  # ns
@@ -35,7 +36,12 @@ _UNIT_NAMES = {
     '\N{MICRO SIGN}s': 'us',
     'nsec': 'ns',
 }
-_SINCE_1970 = {'s': 1e8, 'ms': 1e11, 'us': 1e14, 'ns': 1e17}  # the least that is taken for such
+_SINCE_1970 = {
+    's': 1e8,
+    'ms': 1e11,
+    'us': 1e14,
+    'ns': 1e17,
+}  # the least that is taken for such
 _LAST_TIME = (1 << 31) * SECOND  # ns; what a stamp can hold ends before
 _USUAL_STEPS = (SECOND // 10_000, SECOND)  # ns, between samples
 _GAPS = ('', 'nan', 'na', 'n/a', 'null', 'none')
@@ -78,7 +84,9 @@ class CsvFile(Part):
         InputFileError: the file cannot be read, has no such columns, or no rows.
     """
 
-    def __init__(self, path: Path, chains: Sequence[Chain], time_unit: str = '') -> None:
+    def __init__(
+        self, path: Path, chains: Sequence[Chain], time_unit: str = ''
+    ) -> None:
         super().__init__(path)
         self._dialect = Dialect(path)
         header = _Header(path, self._dialect)
@@ -88,7 +96,9 @@ class CsvFile(Part):
         self.joint_names = tuple(column.name for column in self._columns)
         times = [self._time_of(row) for row in islice(self._rows(), _SAMPLE)]
         if not times:
-            raise InputFileError(str(path), 'no rows; allowed: at least one after the header')
+            raise InputFileError(
+                str(path), 'no rows; allowed: at least one after the header'
+            )
         unit = time_unit or _likely_unit(float(times[0]), named_unit)
         self._factor = TIME_UNITS[unit]
         self.is_relative = float(times[0]) < _SINCE_1970[unit]
@@ -102,12 +112,18 @@ class CsvFile(Part):
         for row in self._rows(progress):
             time = self._time_of(row)
             if time < before:
-                raise self._fault(row, self._time, f'{time} after {before}', 'times in order')
+                raise self._fault(
+                    row, self._time, f'{time} after {before}', 'times in order'
+                )
             before = time
             stamp = round(time * self._factor)
             if abs(stamp) >= _LAST_TIME:
-                raise self._fault(row, self._time, str(time), 'times before 2038; --time-unit '
-                                  'says in which unit they are')
+                raise self._fault(
+                    row,
+                    self._time,
+                    str(time),
+                    'times before 2038; --time-unit says in which unit they are',
+                )
             data = encoder.encode(stamp, self._positions(row))
             if data is not None:
                 yield stamp, data
@@ -121,13 +137,18 @@ class CsvFile(Part):
         """Yield the rows after the header; empty lines and comments are none."""
         dialect = self._dialect
         width = len(dialect.header)
-        lines = islice(lines_of(self.path, dialect.encoding, progress), dialect.header_line, None)
+        lines = islice(
+            lines_of(self.path, dialect.encoding, progress), dialect.header_line, None
+        )
         for line, cells in enumerate(dialect.cells(lines), dialect.header_line + 1):
             if not cells or cells[0].startswith('#'):
                 continue
             if len(cells) != width:
-                raise InputFileError(f'{self.path}:{line}', f'{len(cells)} values under {width} '
-                                     'columns; allowed: one value per column')
+                raise InputFileError(
+                    f'{self.path}:{line}',
+                    f'{len(cells)} values under {width} '
+                    'columns; allowed: one value per column',
+                )
             yield Row(line, cells)
 
     def _time_of(self, row: Row) -> Decimal:
@@ -145,7 +166,9 @@ class CsvFile(Part):
             text = row.cells[column.place]
             value = number(self._dialect.with_point(text))
             if not abs(value) <= LARGEST and text.strip().lower() not in _GAPS:
-                raise self._fault(row, column, repr(text), f'a finite number up to {LARGEST:g}')
+                raise self._fault(
+                    row, column, repr(text), f'a finite number up to {LARGEST:g}'
+                )
             positions.append(column.factor * value)
         return positions
 
@@ -157,13 +180,19 @@ class CsvFile(Part):
         step = statistics.median(steps) * self._factor
         shortest, longest = _USUAL_STEPS
         if not shortest <= step <= longest:
-            self.notes.append(f'the times of {self.path}, taken as {unit}, are '
-                              f'{float(step) / SECOND:g} s apart; --time-unit says in which unit '
-                              'they are')
+            self.notes.append(
+                f'the times of {self.path}, taken as {unit}, are '
+                f'{float(step) / SECOND:g} s apart; --time-unit says in which unit '
+                'they are'
+            )
 
-    def _fault(self, row: Row, column: Column, found: str, allowed: str) -> InputFileError:
-        return InputFileError(f'{self.path}:{row.line}',
-                              f'column {column.name}: {found}; allowed: {allowed}')
+    def _fault(
+        self, row: Row, column: Column, found: str, allowed: str
+    ) -> InputFileError:
+        return InputFileError(
+            f'{self.path}:{row.line}',
+            f'column {column.name}: {found}; allowed: {allowed}',
+        )
 
 
 class Dialect:
@@ -179,8 +208,7 @@ class Dialect:
     """
 
     def __init__(self, path: Path) -> None:
-        with path.open('rb') as stream:
-            head = stream.read(_HEAD)
+        head = first_bytes(path, _HEAD)
         self.encoding = _encoding_of(head)
         lines = head.decode(self.encoding, errors='ignore').splitlines()
         separator = ''
@@ -214,8 +242,9 @@ class _Header:
         shown = [repr(name)[1:-1][:_LONGEST_SHOWN] for name in self._names[:_SHOWN]]
         self._shown = ', '.join(shown)
         if not any(self._names):
-            raise InputFileError(self._place, 'no header; allowed: names of columns: time and '
-                                              'joints')
+            raise InputFileError(
+                self._place, 'no header; allowed: names of columns: time and joints'
+            )
 
     def time_column(self) -> tuple[Column, str]:
         """Return the column of times, and the unit in its name; empty if there is none."""
@@ -230,8 +259,11 @@ class _Header:
         for plain in _TIME_NAMES:
             if plain in found:
                 return found[plain]
-        raise InputFileError(self._place, f'no column of times in the header ({self._shown}); '
-                                          f'allowed: {", ".join(_TIME_NAMES)}')
+        raise InputFileError(
+            self._place,
+            f'no column of times in the header ({self._shown}); '
+            f'allowed: {", ".join(_TIME_NAMES)}',
+        )
 
     def joint_columns(self, chains: Sequence[Chain]) -> list[list[Column]]:
         """Return the columns of each chain's joints; those of a joint stand once."""
@@ -246,7 +278,9 @@ class _Header:
             missing = [name for name in chain.joint_names if name not in columns]
             if missing and len(missing) < chain.n:
                 raise self._missing(missing, chains, columns)
-            groups.append([columns[name] for name in chain.joint_names if name in columns])
+            groups.append(
+                [columns[name] for name in chain.joint_names if name in columns]
+            )
         if not columns:
             raise self._missing(list(wanted), chains, columns)
         return _without_repeats(groups)
@@ -257,24 +291,33 @@ class _Header:
         factor = 1.0
         if not places:
             meanings = [_joint_of(name) for name in self._names]
-            places = [place for place, (name, _) in enumerate(meanings) if name == joint]
+            places = [
+                place for place, (name, _) in enumerate(meanings) if name == joint
+            ]
             factors = [factor for name, factor in meanings if name == joint]
             factor = factors[0] if factors else 1.0
         if len(places) > 1:
             raise self._twice(*(self._names[place] for place in places[:2]))
         return Column(joint, places[0], factor) if places else None
 
-    def _missing(self, joints: Sequence[str], chains: Sequence[Chain], found: Iterable[str]
-                 ) -> InputFileError:
+    def _missing(
+        self, joints: Sequence[str], chains: Sequence[Chain], found: Iterable[str]
+    ) -> InputFileError:
         whole = [chain.name for chain in chains if set(chain.joint_names) <= set(found)]
         advice = f'; or --chains {" ".join(whole)}' if whole else ''
-        return InputFileError(self._place, f'column {", ".join(joints)} is missing in the header '
-                                           f'({self._shown}){advice}')
+        return InputFileError(
+            self._place,
+            f'column {", ".join(joints)} is missing in the header '
+            f'({self._shown}){advice}',
+        )
 
     def _twice(self, one: str, other: str) -> InputFileError:
         names = one if one == other else f'{one} and {other}'
-        return InputFileError(self._place, f'column {names} appears twice in the header '
-                                           f'({self._shown}); allowed: once')
+        return InputFileError(
+            self._place,
+            f'column {names} appears twice in the header '
+            f'({self._shown}); allowed: once',
+        )
 
 
 class _RowEncoder:
@@ -284,7 +327,9 @@ class _RowEncoder:
         self._groups = groups
         names = [column.name for group in groups for column in group]
         self._encode_all = JointStateEncoder(names).encode
-        self._encoders: dict[tuple[str, ...], Callable[[int, Sequence[float]], bytes]] = {}
+        self._encoders: dict[
+            tuple[str, ...], Callable[[int, Sequence[float]], bytes]
+        ] = {}
 
     def encode(self, stamp: int, positions: Sequence[float]) -> bytes | None:
         """Return the bytes of a row's message; None if the row has no positions."""
@@ -332,7 +377,9 @@ def _place_of_header(lines: Sequence[str]) -> int:
         if line.startswith('#'):
             comment = place
         elif line.strip():
-            begins_with_number = math.isfinite(number(re.split(r'[,;\s]', line.strip())[0]))
+            begins_with_number = math.isfinite(
+                number(re.split(r'[,;\s]', line.strip())[0])
+            )
             is_comment_header = lines[comment].startswith('#') and begins_with_number
             return comment if is_comment_header else place
     return comment

@@ -59,29 +59,54 @@ _ORIENTATION = ('roll', 'pitch', 'yaw')
 _LEAST_SPANS = (0.01, 1.0)  # m and deg; smaller movements are hardly meant to be seen
 _LONGEST_NAME = 45  # characters of a joint's
 _SETTINGS: dict[str, Any] = {
-    'font.family': 'sans-serif', 'font.sans-serif': ['DejaVu Sans'], 'font.size': 12,
-    'axes.titlesize': 12, 'axes.titleweight': 'bold', 'axes.titlelocation': 'left',
-    'axes.edgecolor': FAINT, 'axes.spines.top': False, 'axes.spines.right': False,
-    'axes.grid': True, 'axes.axisbelow': True, 'grid.color': GRID, 'xtick.color': FAINT,
-    'ytick.color': FAINT, 'xtick.labelcolor': INK, 'ytick.labelcolor': INK, 'text.color': INK,
-    'axes.labelcolor': INK, 'legend.frameon': False, 'svg.fonttype': 'none',
-    'svg.hashsalt': 'leg_fk', 'pdf.fonttype': 42}
+    'font.family': 'sans-serif',
+    'font.sans-serif': ['DejaVu Sans'],
+    'font.size': 12,
+    'axes.titlesize': 12,
+    'axes.titleweight': 'bold',
+    'axes.titlelocation': 'left',
+    'axes.edgecolor': FAINT,
+    'axes.spines.top': False,
+    'axes.spines.right': False,
+    'axes.grid': True,
+    'axes.axisbelow': True,
+    'grid.color': GRID,
+    'xtick.color': FAINT,
+    'ytick.color': FAINT,
+    'xtick.labelcolor': INK,
+    'ytick.labelcolor': INK,
+    'text.color': INK,
+    'axes.labelcolor': INK,
+    'legend.frameon': False,
+    'svg.fonttype': 'none',
+    'svg.hashsalt': 'leg_fk',
+    'pdf.fonttype': 42,
+}
 
 
 def import_matplotlib() -> ModuleType:
     """Return the package matplotlib with its modules of figures, lines and bitmaps."""
     os.environ |= {'MPLBACKEND': 'agg', 'MATPLOTLIBRC': os.devnull}
-    logging.getLogger('matplotlib').setLevel(logging.CRITICAL)  # what it says of a matplotlibrc
+    logging.getLogger('matplotlib').setLevel(
+        logging.CRITICAL
+    )  # what it says of a matplotlibrc
     try:
         import matplotlib.backends.backend_agg
         import matplotlib.figure
         import matplotlib.lines
     except ImportError as error:
-        raise MissingDependencyError('matplotlib', 'a picture', 'pip install matplotlib (rosdep '
-                                     'key python3-matplotlib)') from error
-    except ValueError as error:  # a matplotlibrc in the working directory that is not text
-        raise LegFKError(f'matplotlib cannot be imported: {error}; is there a file matplotlibrc '
-                         'in this directory?') from error
+        raise MissingDependencyError(
+            'matplotlib',
+            'a picture',
+            'pip install matplotlib (rosdep key python3-matplotlib)',
+        ) from error
+    except (
+        ValueError
+    ) as error:  # a matplotlibrc in the working directory that is not text
+        raise LegFKError(
+            f'matplotlib cannot be imported: {error}; is there a file matplotlibrc '
+            'in this directory?'
+        ) from error
     return matplotlib
 
 
@@ -101,12 +126,14 @@ def check_output(path: str | Path, force: bool) -> None:
     check_target(path, force=force)
     ending = Path(path).suffix
     if ending.lower() not in FORMATS:
-        raise OutputFileError(str(path), f'found {ending or "no ending"}, allowed: '
-                                         f'{", ".join(FORMATS)}')
+        raise OutputFileError(
+            str(path), f'found {ending or "no ending"}, allowed: {", ".join(FORMATS)}'
+        )
 
 
-def save_picture(draw: Callable[[], Figure], path: str | Path, *, force: bool, dpi: int = 150
-                 ) -> None:
+def save_picture(
+    draw: Callable[[], Figure], path: str | Path, *, force: bool, dpi: int = 150
+) -> None:
     """Draw a picture and write it in the format that its ending names, whole or not at all."""
     kind = Path(path).suffix.lower().lstrip('.')
     no_date = {'svg': {'Date': None}, 'pdf': {'CreationDate': None}}
@@ -125,9 +152,15 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def feet_figure(tracks: Sequence[ChainTrack], instants: Sequence[float], title: str, *,
-                over: Sequence[ChainTrack] = (), over_name: str = '', orientation: bool = False
-                ) -> Figure:
+def feet_figure(
+    tracks: Sequence[ChainTrack],
+    instants: Sequence[float],
+    title: str,
+    *,
+    over: Sequence[ChainTrack] = (),
+    over_name: str = '',
+    orientation: bool = False,
+) -> Figure:
     """Return the tips over time, and beside them the chains in space.
 
     Args:
@@ -189,13 +222,23 @@ class _Layout:
         top = self.height - _TOP - _LETTER - row * (_HEADING + _CURVE) - _HEADING
         height = self._bars * _BAR_ROW if row == len(_POSITION) else _CURVE
         left = _LEFT + column * (_PANEL + _BETWEEN)
-        rectangle = (left / self.width, (top - height) / self.height, _PANEL / self.width,
-                     height / self.height)
+        rectangle = (
+            left / self.width,
+            (top - height) / self.height,
+            _PANEL / self.width,
+            height / self.height,
+        )
         return figure.add_axes(rectangle, sharex=share)
 
 
-def _draw_tips(figure: Figure, layout: _Layout, column: int, names: Sequence[str],
-               tracks: Sequence[ChainTrack], over: Sequence[ChainTrack]) -> list[Axes]:
+def _draw_tips(
+    figure: Figure,
+    layout: _Layout,
+    column: int,
+    names: Sequence[str],
+    tracks: Sequence[ChainTrack],
+    over: Sequence[ChainTrack],
+) -> list[Axes]:
     """Draw a coordinate of all tips in each panel of a column."""
     panels: list[Axes] = []
     gaps = {gap for track in tracks for gap in track.gaps}
@@ -207,10 +250,19 @@ def _draw_tips(figure: Figure, layout: _Layout, column: int, names: Sequence[str
         panel = layout.panel(figure, column, row, panels[0] if panels else None)
         panels.append(panel)
         _draw_curves(panel, name, tracks, over)
-        panel.broken_barh(bars, (0, 1), color='black', alpha=0.12, linewidth=0,
-                          transform=panel.get_xaxis_transform())
-        panel.set_title(_heading(name, tracks[0].chain), loc='left',
-                        pad=6 if row else 6 + _LETTER * 72)
+        panel.broken_barh(
+            bars,
+            (0, 1),
+            color='black',
+            alpha=0.12,
+            linewidth=0,
+            transform=panel.get_xaxis_transform(),
+        )
+        panel.set_title(
+            _heading(name, tracks[0].chain),
+            loc='left',
+            pad=6 if row else 6 + _LETTER * 72,
+        )
         panel.margins(x=0, y=0.12)
         _show_no_noise(panel, _LEAST_SPANS[name in _ORIENTATION])
         panel.locator_params(axis='y', nbins=4)
@@ -228,8 +280,9 @@ def _show_no_noise(panel: Axes, least: float) -> None:
         panel.set_ylim(low - missing / 2, high + missing / 2)
 
 
-def _draw_curves(panel: Axes, name: str, tracks: Sequence[ChainTrack],
-                 over: Sequence[ChainTrack]) -> None:
+def _draw_curves(
+    panel: Axes, name: str, tracks: Sequence[ChainTrack], over: Sequence[ChainTrack]
+) -> None:
     """Draw a coordinate of all tips; where two are the same, both can be seen."""
     for track in over:
         _draw_curve(panel, track, name, linestyle=(0, (4, 2)), alpha=0.6, linewidth=1.5)
@@ -247,16 +300,23 @@ def _draw_curve(panel: Axes, track: ChainTrack, name: str, **style: Any) -> None
     highest = factor * track.highest[:, column]
     color = color_of(track.chain)
     if len(lowest) > _MOST_SAMPLES:
-        _draw_band(panel, track, lowest, highest, {**style, 'color': color, 'linewidth': 1})
+        _draw_band(
+            panel, track, lowest, highest, {**style, 'color': color, 'linewidth': 1}
+        )
         return
     is_hardly_a_line = len(np.unique(track.times)) < 3
-    panel.plot(np.insert(track.times, track.breaks, np.nan),
-               np.insert(lowest, track.breaks, np.nan), color=color,
-               marker='o' if is_hardly_a_line else '', **style)
+    panel.plot(
+        np.insert(track.times, track.breaks, np.nan),
+        np.insert(lowest, track.breaks, np.nan),
+        color=color,
+        marker='o' if is_hardly_a_line else '',
+        **style,
+    )
 
 
-def _draw_band(panel: Axes, track: ChainTrack, lowest: Array, highest: Array,
-               style: dict[str, Any]) -> None:
+def _draw_band(
+    panel: Axes, track: ChainTrack, lowest: Array, highest: Array, style: dict[str, Any]
+) -> None:
     """Draw what lies between the lowest and the highest of neighbouring (N,) values."""
     columns = np.linspace(0, len(lowest), _COLUMNS).astype(int)
     edges = np.unique(np.concatenate([columns, track.breaks]))
@@ -269,7 +329,9 @@ def _draw_band(panel: Axes, track: ChainTrack, lowest: Array, highest: Array,
     panel.plot(times, lowest, **style)
     panel.plot(times, highest, **style)
     if 'linestyle' not in style:
-        panel.fill_between(times, lowest, highest, color=style['color'], alpha=0.3, linewidth=0)
+        panel.fill_between(
+            times, lowest, highest, color=style['color'], alpha=0.3, linewidth=0
+        )
 
 
 def _heading(name: str, chain: Chain) -> str:
@@ -287,9 +349,17 @@ def _draw_outside_ranges(panel: Axes, rows: Sequence[OutOfRange]) -> None:
     least = (end - start) / 300  # what can be seen
     for row, outside in enumerate(rows):
         bars = [(begin, max(finish - begin, least)) for begin, finish in outside.spans]
-        panel.broken_barh(bars, (row + 0.6, 0.3), color=color_of(outside.chain), linewidth=0)
-        panel.text(0.005, row + 0.54, range_end(outside), fontsize=10, va='bottom',
-                   transform=panel.get_yaxis_transform())
+        panel.broken_barh(
+            bars, (row + 0.6, 0.3), color=color_of(outside.chain), linewidth=0
+        )
+        panel.text(
+            0.005,
+            row + 0.54,
+            range_end(outside),
+            fontsize=10,
+            va='bottom',
+            transform=panel.get_yaxis_transform(),
+        )
     panel.set_yticks([])
     panel.set_ylim(len(rows), 0)
     panel.set_title('outside its range', loc='left')
@@ -302,7 +372,9 @@ def range_end(outside: OutOfRange) -> str:
     limit = link.limits[outside.is_above]
     value = f'{limit:g} m' if link.is_prismatic else f'{math.degrees(limit):g}°'
     sign = '>' if outside.is_above else '<'
-    return f'{_short(chain.joint_names[outside.joint])} {sign} {value.replace("-", MINUS)}'
+    return (
+        f'{_short(chain.joint_names[outside.joint])} {sign} {value.replace("-", MINUS)}'
+    )
 
 
 def _mark_instants(panels: Sequence[Axes], instants: Sequence[float]) -> None:
@@ -320,12 +392,25 @@ def _mark_instants(panels: Sequence[Axes], instants: Sequence[float]) -> None:
         places[i] = min(places[i], last)
         last = places[i] - gap
     for letter, place in zip(LETTERS, places):
-        panels[0].text(place, 1.02, letter, ha='center', va='bottom', weight='bold', fontsize=11,
-                       transform=panels[0].get_xaxis_transform())
+        panels[0].text(
+            place,
+            1.02,
+            letter,
+            ha='center',
+            va='bottom',
+            weight='bold',
+            fontsize=11,
+            transform=panels[0].get_xaxis_transform(),
+        )
 
 
-def _draw_scenes(figure: Figure, box: Box, tracks: Sequence[ChainTrack],
-                 over: Sequence[ChainTrack], instants: Sequence[float]) -> float:
+def _draw_scenes(
+    figure: Figure,
+    box: Box,
+    tracks: Sequence[ChainTrack],
+    over: Sequence[ChainTrack],
+    instants: Sequence[float],
+) -> float:
     """Draw the chains in space at each instant; return the side of the floor's squares [m]."""
     columns = min(2, len(instants))
     rows = math.ceil(len(instants) / 2)
@@ -334,7 +419,9 @@ def _draw_scenes(figure: Figure, box: Box, tracks: Sequence[ChainTrack],
     points = []
     for instant in instants:
         for track in (*tracks, *over):
-            points.append(track.chain.frames(track.positions[track.nearest(instant)])[:, :3, 3])
+            points.append(
+                track.chain.frames(track.positions[track.nearest(instant)])[:, :3, 3]
+            )
     everywhere = np.vstack(points)
     for i, instant in enumerate(instants):
         left = box.left + width * (i % columns)
@@ -342,20 +429,32 @@ def _draw_scenes(figure: Figure, box: Box, tracks: Sequence[ChainTrack],
         space = Space(figure, Box(left, bottom, width, height - _HEADING), everywhere)
         _draw_scene(space, tracks, over, instant)
         words = f'{LETTERS[i]}  {instant:.2f} s'
-        figure.text((left + 0.2) / figure.get_figwidth(),
-                    (bottom + height - _HEADING / 2) / figure.get_figheight(), words,
-                    weight='bold', va='center')
+        figure.text(
+            (left + 0.2) / figure.get_figwidth(),
+            (bottom + height - _HEADING / 2) / figure.get_figheight(),
+            words,
+            weight='bold',
+            va='center',
+        )
     return space.step
 
 
-def _draw_scene(space: Space, tracks: Sequence[ChainTrack], over: Sequence[ChainTrack],
-                instant: float) -> None:
+def _draw_scene(
+    space: Space,
+    tracks: Sequence[ChainTrack],
+    over: Sequence[ChainTrack],
+    instant: float,
+) -> None:
     """Draw the root's axes and the chains that have a pose, the nearest last."""
     space.root()
     for track in over:
         if track.covers(instant):
-            space.chain(track.chain, track.positions[track.nearest(instant)], 5, alpha=0.3)
-    there = [(track, track.nearest(instant)) for track in tracks if track.covers(instant)]
+            space.chain(
+                track.chain, track.positions[track.nearest(instant)], 5, alpha=0.3
+            )
+    there = [
+        (track, track.nearest(instant)) for track in tracks if track.covers(instant)
+    ]
 
     def depth(sample: tuple[ChainTrack, int]) -> float:
         track, i = sample
@@ -364,42 +463,74 @@ def _draw_scene(space: Space, tracks: Sequence[ChainTrack], over: Sequence[Chain
     for rank, (track, i) in enumerate(sorted(there, key=depth)):
         zorder = 10.0 * (rank + 1)
         q = track.positions[i]
-        space.line(track.path_around(i, _TRAIL), color=color_of(track.chain), linewidth=1,
-                   alpha=0.5, zorder=zorder)
+        space.line(
+            track.path_around(i, _TRAIL),
+            color=color_of(track.chain),
+            linewidth=1,
+            alpha=0.5,
+            zorder=zorder,
+        )
         space.chain(track.chain, q, zorder)
         space.frame(track.chain.forward(q), space.step, zorder + 5, 1.8, size=8)
 
 
-def _draw_legend(figure: Figure, layout: _Layout, tracks: Sequence[ChainTrack],
-                 over: Sequence[ChainTrack], over_name: str) -> None:
+def _draw_legend(
+    figure: Figure,
+    layout: _Layout,
+    tracks: Sequence[ChainTrack],
+    over: Sequence[ChainTrack],
+    over_name: str,
+) -> None:
     """Draw what the lines are, in a row that is as wide as the figure at most."""
     Line2D = import_matplotlib().lines.Line2D
-    lines = {_label(track): Line2D([], [], color=color_of(track.chain), linewidth=2)
-             for track in tracks}
+    lines = {
+        _label(track): Line2D([], [], color=color_of(track.chain), linewidth=2)
+        for track in tracks
+    }
     for track in over:
         lines[f'{_label(track)}, {over_name}'] = Line2D(
-            [], [], color=color_of(track.chain), linewidth=1.5, linestyle=(0, (4, 2)), alpha=0.6)
+            [],
+            [],
+            color=color_of(track.chain),
+            linewidth=1.5,
+            linestyle=(0, (4, 2)),
+            alpha=0.6,
+        )
     lines[f'path of a tip, {_TRAIL:g} s before and after'] = Line2D(
-        [], [], color=FAINT, linewidth=1, alpha=0.5)
+        [], [], color=FAINT, linewidth=1, alpha=0.5
+    )
     legend = figure.legend(
-        lines.values(), lines.keys(), ncols=len(lines), loc='center left', fontsize=11,
-        borderpad=0, borderaxespad=0, handlelength=1.4, columnspacing=1.6,
-        bbox_to_anchor=(_LEFT / layout.width, 1 - _LEGEND / layout.height))
+        lines.values(),
+        lines.keys(),
+        ncols=len(lines),
+        loc='center left',
+        fontsize=11,
+        borderpad=0,
+        borderaxespad=0,
+        handlelength=1.4,
+        columnspacing=1.6,
+        bbox_to_anchor=(_LEFT / layout.width, 1 - _LEGEND / layout.height),
+    )
     _fit(figure, legend.get_texts(), layout.width - _LEFT - _MARGIN - 0.6 * len(lines))
 
 
-def _draw_words(figure: Figure, layout: _Layout, title: str, notes: str, notes_on_space: str
-                ) -> None:
+def _draw_words(
+    figure: Figure, layout: _Layout, title: str, notes: str, notes_on_space: str
+) -> None:
     """Write what stands above the panels and the scenes."""
+
     def write(left: float, top: float, words: str, room: float, **style: Any) -> None:
-        text = figure.text(left / layout.width, 1 - top / layout.height, words, va='center',
-                           **style)
+        text = figure.text(
+            left / layout.width, 1 - top / layout.height, words, va='center', **style
+        )
         _fit(figure, [text], room)
 
     beside = layout.scenes.left
     write(0.4, _TITLE, title, layout.width - 0.4 - _MARGIN, fontsize=19, weight='bold')
     write(0.4, _NOTES, notes, beside - 0.6, fontsize=10.5, color=FAINT)
-    write(beside + 0.2, _NOTES, notes_on_space, _SCENES - 0.2, fontsize=10.5, color=FAINT)
+    write(
+        beside + 0.2, _NOTES, notes_on_space, _SCENES - 0.2, fontsize=10.5, color=FAINT
+    )
 
 
 def _fit(figure: Figure, texts: Sequence[Text], room: float) -> None:

@@ -14,7 +14,9 @@ SECOND = 1_000_000_000  # ns
 
 _ENCAPSULATION = b'\x00\x01\x00\x00'  # CDR, little-endian
 
-Messages = Iterator[tuple[int, bytes]]  # time of recording [ns] and CDR bytes of a JointState
+Messages = Iterator[
+    tuple[int, bytes]
+]  # time of recording [ns] and CDR bytes of a JointState
 
 
 class Part(ABC):
@@ -64,7 +66,9 @@ class JointStateEncoder:
         head = _padded(_string(''), 4) + count
         for name in names:
             head += _padded(_string(name), 4)
-        self._head = _padded(head + count, 8)  # as it is aligned after a stamp of 8 bytes
+        self._head = _padded(
+            head + count, 8
+        )  # as it is aligned after a stamp of 8 bytes
         self._pack = struct.Struct(f'<4siI{len(self._head)}s{len(names)}dII').pack
 
     def encode(self, stamp: int, positions: Sequence[float]) -> bytes:

@@ -86,14 +86,14 @@ class PoseTable:
     def _write(self) -> None:
         """Write the rows that are done."""
         stamps = np.array([stamp for stamp, _ in self._done], dtype=np.int64)
-        values = np.full((len(stamps), len(self._chains) * self._width), np.nan)
+        rows = [row for _, row in self._done]
+        values = np.full((len(rows), len(self._chains), self._width), np.nan)
         for i, chain in enumerate(self._chains):
-            there = [place for place, (_, row) in enumerate(self._done) if chain.name in row]
+            there = [place for place, row in enumerate(rows) if chain.name in row]
             if there:
-                vectors = [self._done[place][1][chain.name] for place in there]
-                start = i * self._width
-                values[there, start:start + self._width] = self._values(chain, vectors)
-        self._sink.write(stamps, values)
+                vectors = [rows[place][chain.name] for place in there]
+                values[there, i] = self._values(chain, vectors)
+        self._sink.write(stamps, values.reshape(len(rows), -1))
         self._done.clear()
 
     def _values(self, chain: Chain, vectors: Sequence[Ready]) -> Array:
@@ -127,7 +127,9 @@ class CsvTable:
         for stamp, row in zip(stamps.tolist(), values.tolist()):
             sign = '-' if stamp < 0 else ''
             sec, nanosec = divmod(abs(stamp), SECOND)
-            cells = [repr(value) if value == value else '' for value in row]  # NaN is not itself
+            cells = [
+                repr(value) if value == value else '' for value in row
+            ]  # NaN is not itself
             lines.append(f'{sign}{sec}.{nanosec:09d},{",".join(cells)}\n')
         self._stream.write(''.join(lines))
 

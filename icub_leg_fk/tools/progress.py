@@ -2,19 +2,16 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-import io
-from pathlib import Path
 import sys
 import time
 from typing import Any
 
-from icub_leg_fk.errors import InputFileError, MissingDependencyError
+from icub_leg_fk.errors import MissingDependencyError
 from icub_leg_fk.tools.terminal import import_rich
 
 Progress = Callable[[float], None]  # takes the share that is done, 0 to 1
 
 _PATIENCE = 1.0  # s; a shorter task shows nothing
-_LINES = 1000  # between two looks
 
 
 @contextmanager
@@ -61,22 +58,3 @@ def _bar() -> Any:
         transient=True,
         redirect_stdout=False,
     )
-
-
-def lines_of(path: Path, encoding: str, progress: Progress | None = None) -> Iterator[str]:
-    """Yield the lines of a text file, and tell how far it is read.
-
-    Raises:
-        InputFileError: it cannot be read, or is not text of this encoding.
-    """
-    try:
-        with path.open('rb') as stream:
-            size = max(1, path.stat().st_size)
-            for number, line in enumerate(io.TextIOWrapper(stream, encoding)):
-                if progress is not None and number % _LINES == 0:
-                    progress(stream.tell() / size)
-                yield line
-    except UnicodeDecodeError as error:
-        raise InputFileError(str(path), f'is no text ({error.reason})') from error
-    except OSError as error:
-        raise InputFileError(str(path), f'cannot be read: {error.strerror}') from error

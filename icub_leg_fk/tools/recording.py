@@ -36,11 +36,14 @@ from icub_leg_fk.tools.progress import Progress
 from icub_leg_fk.tools.yarp_log import DATA, is_yarp_log, PARTS, YarpLog
 import numpy as np
 
-KINDS = 'a bag (directory, .mcap or .db3), a CSV file (.csv, .tsv or .txt) or a directory of ' \
-        'yarpdatadumper'
+KINDS = (
+    'a bag (directory, .mcap or .db3), a CSV file (.csv, .tsv or .txt) or a directory of '
+    'yarpdatadumper'
+)
 
 _OF_ROS_1 = '.bag'
 _COMPRESSED = '.zstd'
+
 
 class BagTopics(Part):
     """The joint states of a bag on some topics, as a part of a recording.
@@ -77,7 +80,8 @@ class BagTopics(Part):
         return [
             name
             for name in self._bag.joint_topics()
-            if name not in self.topic and set(joints) & set(self._bag.joint_names([name]))
+            if name not in self.topic
+            and set(joints) & set(self._bag.joint_names([name]))
         ]
 
 
@@ -191,7 +195,9 @@ def follow(
     return joint_input.take_look()
 
 
-def warnings_of(recording: Recording, look: Look, poseless: Collection[str]) -> list[str]:
+def warnings_of(
+    recording: Recording, look: Look, poseless: Collection[str]
+) -> list[str]:
     """Return what there is to say of the joint states, and why chains have no pose.
 
     Args:
@@ -241,7 +247,9 @@ class JointRecording:
 
     def positions_of(self, chain: Chain) -> Array:
         """Return the (N, n) joint positions of a chain [rad or m]."""
-        return self.positions[:, [self.joint_names.index(name) for name in chain.joint_names]]
+        return self.positions[
+            :, [self.joint_names.index(name) for name in chain.joint_names]
+        ]
 
 
 def read_joints(paths: Sequence[str | Path], chains: Sequence[Chain]) -> JointRecording:
@@ -286,7 +294,9 @@ def write_joint_states(
             writer.write(topic, stamp, data)
 
 
-def parts_without_topics(path: Path, chains: Sequence[Chain], time_unit: str) -> list[Part]:
+def parts_without_topics(
+    path: Path, chains: Sequence[Chain], time_unit: str
+) -> list[Part]:
     """Return the CSV file or the logs of YARP at a path; nothing if there is a bag.
 
     Raises:
@@ -314,7 +324,8 @@ def _yarp_logs(path: Path) -> list[Part]:
         log = YarpLog(path)
         if not log.joint_names:
             raise InputFileError(
-                str(path), f'{log.port} is of no known part; allowed: {", ".join(PARTS)}'
+                str(path),
+                f'{log.port} is of no known part; allowed: {", ".join(PARTS)}',
             )
         return [log]
     if not path.is_dir() or (path / METADATA).exists():
@@ -363,7 +374,9 @@ def _refuse_separate_spans(parts: Sequence[Part]) -> None:
         )
 
 
-def _share_of(place: int, shares: list[float], progress: Progress | None) -> Progress | None:
+def _share_of(
+    place: int, shares: list[float], progress: Progress | None
+) -> Progress | None:
     """Return what takes the share of one part that is done, and tells that of all."""
     if progress is None:
         return None

@@ -133,7 +133,9 @@ def read_tracks(
     with open_recording(paths, chains, topics, time_unit) as recording:
         traces = _Traces(chains, recording.start, begin, end)
         look = follow(recording, chains, traces.take, progress=progress)
-        poseless = [name for name, of_chain in look.chains.items() if not of_chain.ready]
+        poseless = [
+            name for name, of_chain in look.chains.items() if not of_chain.ready
+        ]
         warnings = warnings_of(recording, look, poseless)
     tracks = [traces.track(chain) for chain in chains if chain.name not in poseless]
     return Reading(tracks, warnings, recording.notes)
@@ -167,7 +169,11 @@ class _Traces:
     """Takes joint vectors, and gives what each chain did."""
 
     def __init__(
-        self, chains: Sequence[Chain], start: int | None, begin: float | None, end: float | None
+        self,
+        chains: Sequence[Chain],
+        start: int | None,
+        begin: float | None,
+        end: float | None,
     ) -> None:
         self._traces = {chain.name: _Trace(chain) for chain in chains}
         self._start = start
@@ -289,7 +295,9 @@ class _Trace:
         yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
         return np.stack([roll, pitch, yaw], axis=1)
 
-    def _outside_ranges(self, stamps: NDArray[np.int64], start: int) -> list[OutOfRange]:
+    def _outside_ranges(
+        self, stamps: NDArray[np.int64], start: int
+    ) -> list[OutOfRange]:
         """Return when joints were outside their ranges, up to the sample after."""
         bits = np.concatenate(self._outside)
         found = []

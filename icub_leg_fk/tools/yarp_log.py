@@ -13,9 +13,10 @@ from pathlib import Path
 import re
 
 from icub_leg_fk.errors import InputFileError
+from icub_leg_fk.tools.input_file import lines_of
 from icub_leg_fk.tools.joint_states import JointStateEncoder, Messages, Part, SECOND
 from icub_leg_fk.tools.options import LARGEST, number
-from icub_leg_fk.tools.progress import lines_of, Progress
+from icub_leg_fk.tools.progress import Progress
 
 INFO = 'info.log'
 DATA = 'data.log'
@@ -30,7 +31,7 @@ PARTS = {  # and their joints in YARP's order, after which others may follow, su
 
 _PORT = re.compile(r'(/\S+)\s+\[connected\]')
 _STAMP = re.compile(r'Stamp:\s*([a-z+]+)')
-_SINCE_1970 = 10 ** 8  # s; a later time counts from then
+_SINCE_1970 = 10**8  # s; a later time counts from then
 
 
 class YarpLog(Part):
@@ -48,8 +49,11 @@ class YarpLog(Part):
         info = ''.join(lines_of(path / INFO, 'utf-8'))
         port = _PORT.search(info)
         if port is None:
-            raise InputFileError(str(path / INFO), 'names no port; allowed: a line such as '
-                                                   '[0.0] /icub/left_leg/state:o [connected]')
+            raise InputFileError(
+                str(path / INFO),
+                'names no port; allowed: a line such as '
+                '[0.0] /icub/left_leg/state:o [connected]',
+            )
         self.port = port[1]
         words = self.port.split('/')
         self.joint_names = next((PARTS[word] for word in words if word in PARTS), ())
@@ -89,10 +93,13 @@ class YarpLog(Part):
         time = words[self._clocks.index('tx') if 'tx' in self._clocks else 0]
         if not math.isfinite(number(time)):
             raise self._fault(line, f'time {time!r}', 'seconds')
-        values = _positions(words[-1])[:len(self.joint_names)]
+        values = _positions(words[-1])[: len(self.joint_names)]
         if len(values) < len(self.joint_names):
-            raise self._fault(line, f'{len(values)} values', f'{len(self.joint_names)} or more of '
-                                                             f'{self.port}')
+            raise self._fault(
+                line,
+                f'{len(values)} values',
+                f'{len(self.joint_names)} or more of {self.port}',
+            )
         degrees = [number(value) for value in values]
         for text, value in zip(values, degrees):
             if not abs(value) <= LARGEST and text.lower() != 'nan':
@@ -101,7 +108,9 @@ class YarpLog(Part):
         return stamp, [math.radians(value) for value in degrees]
 
     def _fault(self, line: int, found: str, allowed: str) -> InputFileError:
-        return InputFileError(f'{self.path / DATA}:{line}', f'{found}; allowed: {allowed}')
+        return InputFileError(
+            f'{self.path / DATA}:{line}', f'{found}; allowed: {allowed}'
+        )
 
 
 def is_yarp_log(path: Path) -> bool:

@@ -413,7 +413,9 @@ def test_poses_that_are_there_already_are_not_mixed_with_new_ones(tmp_path, reco
 def test_another_joint_topic_and_its_namespace(tmp_path):
     write_bag(tmp_path / 'in', joints=walk(10), topic='/robot/joints')
     assert_one_line_complaint(
-        run_main('bag', tmp_path / 'in', tmp_path / 'out', '--joint-topic', '/joint_states'),
+        run_main(
+            'bag', tmp_path / 'in', tmp_path / 'out', '--joint-topic', '/joint_states'
+        ),
         'no joint states on /joint_states; --joint-topic can be /robot/joints',
     )
     added = add_foot_poses(tmp_path / 'in', tmp_path / 'out').added
@@ -425,7 +427,9 @@ def test_another_joint_topic_and_its_namespace(tmp_path):
 def test_two_robots_fit_into_one_bag(tmp_path):
     topics = {f'/icub{i}/joint_states': (JOINT_STATE, [], walk(10)) for i in (1, 2)}
     write_topics(tmp_path / 'in', topics)
-    add_foot_poses(tmp_path / 'in', tmp_path / 'one', joint_topics=['/icub1/joint_states'])
+    add_foot_poses(
+        tmp_path / 'in', tmp_path / 'one', joint_topics=['/icub1/joint_states']
+    )
     added = add_foot_poses(
         tmp_path / 'one', tmp_path / 'two', joint_topics=['/icub2/joint_states']
     ).added

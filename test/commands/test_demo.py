@@ -42,7 +42,9 @@ def own_directory(tmp_path, monkeypatch):
 
 
 def walk(seconds):
-    return read_joints([config_file('examples/synthetic_walk.csv')], CHAINS).first(seconds)
+    return read_joints([config_file('examples/synthetic_walk.csv')], CHAINS).first(
+        seconds
+    )
 
 
 def start(*words):

@@ -287,11 +287,11 @@ def test_failed_picture_leaves_nothing_behind(walking_csv, monkeypatch):
     from matplotlib.figure import Figure
 
     def fail(*args, **kwargs):
-        raise OSError(28, 'No space left on device')
+        raise OSError(28, 'no space left on device')
 
     monkeypatch.setattr(Figure, 'savefig', fail)
     assert_one_line_complaint(
-        run_main('plot', 'walking.csv'), 'No space left on device'
+        run_main('plot', 'walking.csv'), 'no space left on device'
     )
     assert [path.name for path in Path().iterdir()] == ['walking.csv']
 
@@ -487,8 +487,16 @@ def odd_pictures(tracks, tmp_path):
     yield 'x' * 120, tracks, {'orientation': True}
     yield 'over', tracks, {'over': tracks, 'over_name': 'y' * 60, 'orientation': True}
     yield 'near', tracks, {'instants': [1.96, 1.97, 1.98, 1.99]}
-    yield 'gap', [with_gap(track) for track in tracks], {'instants': [0.1, 0.2, 41.6, 41.7]}
-    yield 'degrees', [still(chain, 30, 60.0) for chain in LEGS], {'instants': [0.0, 0.1]}
+    yield (
+        'gap',
+        [with_gap(track) for track in tracks],
+        {'instants': [0.1, 0.2, 41.6, 41.7]},
+    )
+    yield (
+        'degrees',
+        [still(chain, 30, 60.0) for chain in LEGS],
+        {'instants': [0.0, 0.1]},
+    )
     yield 'folded', [still(chain, 30, 2.0) for chain in LEGS], {'instants': [0.0, 0.1]}
     yield 'sample', [still(chain, 1) for chain in LEGS], {'instants': [0.0]}
     yield 'other root', [still(arm, 9, 1.0)], {'instants': [0.0], 'orientation': True}
@@ -516,7 +524,9 @@ def test_no_text_is_outside_the_picture_or_over_another(tracks, tmp_path, monkey
         width, height = figure.get_size_inches() * figure.dpi
         assert len(shown) > 10
         for text, box in shown.items():
-            is_inside = 0 <= box.x0 and box.x1 <= width and 0 <= box.y0 and box.y1 <= height
+            is_inside = (
+                0 <= box.x0 and box.x1 <= width and 0 <= box.y0 and box.y1 <= height
+            )
             assert is_inside, (title, text.get_text())
         for (one, first), (two, second) in combinations(shown.items(), 2):
             is_over = first.shrunk(0.98, 0.9).overlaps(second)
@@ -537,7 +547,9 @@ def test_orientation_is_that_from_the_posture_at_zero(tracks):
     track = track_of(LEGS[0], np.arange(3.0), q)
     figure = drawing.feet_figure([track], [0.0], 'walk', orientation=True)
     curves = [panel.lines[0].get_ydata() for panel in figure.axes[3:6]]
-    R = np.array([LEGS[0].forward(row)[:3, :3] @ LEGS[0].forward(q[0])[:3, :3].T for row in q])
+    R = np.array(
+        [LEGS[0].forward(row)[:3, :3] @ LEGS[0].forward(q[0])[:3, :3].T for row in q]
+    )
     yaw = np.arctan2(R[:, 1, 0], R[:, 0, 0])
     pitch = np.arcsin(-R[:, 2, 0])
     roll = np.arctan2(R[:, 2, 1], R[:, 2, 2])
@@ -549,11 +561,17 @@ def test_orientation_is_that_from_the_posture_at_zero(tracks):
 def test_another_recording_is_drawn_below(walking_csv):
     other = walking_csv.with_name('other.csv')
     other.write_text(walking_csv.read_text())
-    _, errors = plotted('walking.csv', '--over', 'other.csv', '-o', 'both.svg', '--orientation')
+    _, errors = plotted(
+        'walking.csv', '--over', 'other.csv', '-o', 'both.svg', '--orientation'
+    )
     assert errors == ''
     texts = texts_in('both.svg')
     assert 'walking.csv   v2_5   over   other.csv   v2_5' in texts
-    assert {'left foot', 'left foot, other.csv', 'yaw about z (up) from q = 0 [°]'} <= set(texts)
+    assert {
+        'left foot',
+        'left foot, other.csv',
+        'yaw about z (up) from q = 0 [°]',
+    } <= set(texts)
 
 
 def test_legs_are_drawn_only_where_poses_are(tmp_path, monkeypatch):
@@ -562,23 +580,34 @@ def test_legs_are_drawn_only_where_poses_are(tmp_path, monkeypatch):
     rows = [[time, *(0.05 * np.sin(time + np.arange(12)))] for time in times]
     write_csv('gap.csv', ['time', *JOINTS], rows)
     plotted('gap.csv', '-o', 'gap.svg')
-    shown = [float(text.split()[1]) for text in texts_in('gap.svg')
-             if text and re.fullmatch(r'[ABCD]  [\d.]+ s', text)]
+    shown = [
+        float(text.split()[1])
+        for text in texts_in('gap.svg')
+        if text and re.fullmatch(r'[ABCD]  [\d.]+ s', text)
+    ]
     assert len(shown) == 4
     assert all(min(abs(time - np.array(times))) < 0.01 for time in shown)
     plotted('gap.csv', '-o', 'at.svg', '--at', '0.201,41')
     assert {'A  0.20 s', 'B  41.00 s'} <= set(texts_in('at.svg'))
     done = run_main('plot', 'gap.csv', '-o', 'x.svg', '--at', '20')
-    assert_one_line_complaint(done, '--at: found 20 s, where there is no pose; allowed: 0 to 0.49 '
-                                    's, 40.5 to 41.49 s')
+    assert_one_line_complaint(
+        done,
+        '--at: found 20 s, where there is no pose; allowed: 0 to 0.49 '
+        's, 40.5 to 41.49 s',
+    )
 
 
 def test_a_clock_that_steps_back_is_reported(tmp_path, monkeypatch):
     bag_files = pytest.importorskip('support.bag_files')
     monkeypatch.chdir(tmp_path)
     stamps = [10**10 + 10**7 * (i if i < 50 else i - 40) for i in range(100)]
-    bag_files.write_bag('bag', joints=[(10**10 + 10**7 * i, bag_files.joint_state(stamp))
-                                       for i, stamp in enumerate(stamps)])
+    bag_files.write_bag(
+        'bag',
+        joints=[
+            (10**10 + 10**7 * i, bag_files.joint_state(stamp))
+            for i, stamp in enumerate(stamps)
+        ],
+    )
     _, errors = plotted('bag')
     assert 'time stepped back to 10.100 s' in errors
 
