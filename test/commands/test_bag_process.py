@@ -216,7 +216,7 @@ def test_the_input_is_never_the_output(tmp_path, source):
         (['in', 'notes.txt/out'], 'there is no directory'),
         (['in', 'new/out'], 'there is no directory'),
         (['in', '/'], 'is the input itself'),
-        (['in', 'o' * 250], 'File name too long'),
+        (['in', 'o' * 250], 'file name too long'),
     ],
 )
 def test_wrong_words_are_one_line(tmp_path, monkeypatch, source, words, complaint):

@@ -72,7 +72,9 @@ class DescribedRobot(Robot):
     def wait_for_value(self, words):
         """Wait until the left leg's status says this of the description."""
         self.statuses(
-            lambda statuses: words in statuses['left_leg'].values['description'],
+            lambda statuses: (
+                words in statuses['left_leg'].values.get('description', '')
+            ),
             meanwhile=self.send_now,
         )
 
@@ -259,5 +261,5 @@ def test_a_urdf_is_a_kinematics_file(tmp_path):
         assert_poses(robot.poses_now(), GOOD)
         [warning] = robot.said('WARN')
     assert warning.startswith(
-        f"root_frame not used: unknown link of {robots} 'odom'; known: "
+        f"root_frame not used: unknown link 'odom' of {robots}; known: "
     )

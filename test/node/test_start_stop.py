@@ -124,7 +124,7 @@ def test_a_root_that_a_urdf_does_not_have_is_refused_on_the_command_line(
         '--ros-args', '-p', f'kinematics_file:={file}', '-p', 'root_frame:=base'
     )
     assert (
-        f"parameter root_frame: unknown link of {file} 'base'; known: l_foot_dh_frame"
+        f"parameter root_frame: unknown link 'base' of {file}; known: l_foot_dh_frame"
         in line
     )
 
