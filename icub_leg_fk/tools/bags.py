@@ -42,6 +42,7 @@ _MEND = {
     '.db3': '`ros2 bag reindex` may mend it',
 }
 _CLEAN = re.compile(r'/?(?!/)[A-Za-z0-9._/ +@:,=-]*')  # what also sqlite takes as it is
+_MOST_METADATA = 1 << 24  # bytes
 _TAIL = 1 << 20  # bytes of an MCAP file, with its summary
 _MCAP_TOPIC = re.compile(
     rb'([!-~]+)[\4\x08\x0a]\0\0\0(json|ros1|cbor|protobuf|flatbuffer)'
@@ -347,6 +348,8 @@ def _reason_and_mend(directory: Path, reason: str) -> tuple[str, str]:
     is_mcap = any('.mcap' in name for name in names)
     is_sqlite = any('.db3' in name for name in names)
     if METADATA in names:
+        if 'version' in reason:
+            return reason, 'a newer rosbags may read it; its files alone can be given'
         if not is_mcap and not is_sqlite:
             return reason, 'its files must stand beside it'
         return reason, _MEND['.mcap' if is_mcap else '.db3']
@@ -459,7 +462,9 @@ def _encodings_of_other_mcap(file: Path) -> dict[str, str]:
 
 def _clean_path(path: Path, scratch: Path) -> Path:
     """Return a path that every library takes: itself, or links to it in a scratch directory."""
-    if _CLEAN.fullmatch(str(path)):
+    metadata = path / METADATA
+    is_plain = not metadata.is_file() or first_bytes(metadata, _MOST_METADATA).isascii()
+    if is_plain and _CLEAN.fullmatch(str(path)):
         return path
     ending = path.suffix if path.suffix in STORAGES else ''
     clean = scratch / f'bag{ending}'
@@ -469,4 +474,9 @@ def _clean_path(path: Path, scratch: Path) -> Path:
     clean.mkdir()
     for entry in path.iterdir():
         (clean / entry.name).symlink_to(entry.resolve())
+    if not is_plain:  # rosbags reads it in the encoding of the locale, whatever that is
+        with suppress(yaml.YAMLError):
+            escaped = yaml.safe_dump(yaml.safe_load(metadata.read_bytes()))
+            (clean / METADATA).unlink()
+            (clean / METADATA).write_text(escaped)
     return clean

@@ -25,7 +25,7 @@ GRID = '#dddddd'
 FLOOR = '#f7f7f7'
 
 _ROOT_AXES = 1.2  # sides of a square
-_MARGIN = 0.25  # inches around what is seen, for the names of axes
+_MARGIN = 0.2  # inches around what is seen, for the names of axes
 _REACHES = (1.2, 1.45, 1.7, 2.0)  # lengths of an axis at which its name may stand
 _POINT = 1 / 72  # inch
 _LEAST_ARROW = 0.12  # inches; a shorter one has no head
