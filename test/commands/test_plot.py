@@ -169,11 +169,8 @@ def test_from_and_to_cut_the_recording_and_what_is_drawn_is_named(walking_csv):
         'z (up) in root_link [m]',
         'time [s]',
     } <= set(texts)
-    assert [texts.count(name) for name in 'xyz'] == [
-        3,
-        3,
-        3,
-    ]  # of the root and of both feet
+    for name in 'xyz':  # of the root, and of the feet where there is room
+        assert 1 <= texts.count(name) <= 3
 
 
 def test_nothing_of_the_users_matplotlib_settings_is_taken(walking_csv):
