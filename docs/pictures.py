@@ -6,14 +6,9 @@ import sys
 from icub_leg_fk.commands.plot import default_instants
 from icub_leg_fk.kinematics import config_file, load_chain
 from icub_leg_fk.stream.colors import color_of
-from icub_leg_fk.tools.drawing import (
-    FAINT,
-    feet_figure,
-    new_figure,
-    save_picture,
-    Space,
-)
-from icub_leg_fk.tools.recording import read_csv
+from icub_leg_fk.tools.drawing import feet_figure, new_figure, save_picture
+from icub_leg_fk.tools.space import Box, FAINT, Space
+from icub_leg_fk.tools.tracks import read_tracks
 import numpy as np
 
 LEGS = [load_chain(name) for name in ('left_leg', 'right_leg')]
@@ -26,9 +21,8 @@ AXES = {
 
 def walking():
     """Return the feet of the synthetic gait over time."""
-    joint_names = [name for leg in LEGS for name in leg.joint_names]
-    gait = read_csv(config_file('examples/synthetic_walk.csv'), joint_names)
-    tracks = [gait.track(leg.with_frame('sole')) for leg in LEGS]
+    soles = [leg.with_frame('sole') for leg in LEGS]
+    tracks = read_tracks([config_file('examples/synthetic_walk.csv')], soles).tracks
     return feet_figure(
         tracks, default_instants(tracks), f'synthetic gait   {LEGS[0].version}'
     )
@@ -37,32 +31,30 @@ def walking():
 def frames():
     """Return a drawing of the axes: of the root on the legs, and of both frames on a foot."""
     figure = new_figure(11.0, 6.6)
-    grid = figure.add_gridspec(
-        2, 2, left=0.0, right=1.0, top=0.94, bottom=0.0, hspace=0.0
-    )
     figure.text(0.03, 0.94, LEGS[0].root_frame, fontsize=15, weight='bold')
     points = np.vstack([leg.frames(STANDING)[:, :3, 3] for leg in LEGS])
-    space = Space(figure, grid[:, 0], points, azimuth=222.0, zoom=1.1)
+    space = Space(figure, Box(0.2, 0.1, 5.2, 6.1), points, azimuth=222.0)
     for leg in reversed(LEGS):
         space.chain(leg, STANDING, 10)
-    space.frame(np.eye(4), 0.13, 60, 2.6, ('x backward', 'y right', 'z up'), 12)
+    space.frame(np.eye(4), 0.1, 60, 2.6, ('x backward', 'y right', 'z up'), 12)
     for row, (name, axes) in enumerate(AXES.items()):
         top = 0.94 - 0.48 * row
         frame_ids = [leg.with_frame(name).frame_id for leg in LEGS]
         default = '' if row else ', the default'
         figure.text(0.51, top, ',  '.join(frame_ids), fontsize=15, weight='bold')
         figure.text(0.51, top - 0.045, f'foot_frame: {name}{default}', color=FAINT)
-        draw_foot(figure, grid[row, 1], LEGS[0].with_frame(name), axes)
+        box = Box(5.3, 3.3 - 3.2 * row, 5.6, 2.5)
+        draw_foot(figure, box, LEGS[0].with_frame(name), axes)
     return figure
 
 
-def draw_foot(figure, place, leg, axes):
+def draw_foot(figure, box, leg, axes):
     """Draw a foot from near, with its frame and the names of its axes."""
     T = leg.forward(STANDING)
     sole = leg.sole_outline(STANDING) - T[:3, 3]
     T[:3, 3] = 0.0
-    seen = np.array([(0.05, 0.03, 0.0), (-0.12, -0.1, 0.06)])
-    space = Space(figure, place, seen, azimuth=222.0, elevation=24.0, zoom=1.2)
+    seen = np.array([(0.05, 0.03, 0.0), (-0.12, -0.1, 0.0), (0.0, 0.0, 0.12)])
+    space = Space(figure, box, seen, azimuth=222.0, elevation=24.0)
     space.fill(sole, color_of(leg), 5, 0.3)
     space.line(
         [(0.0, 0.0, 0.0), (0.0, 0.0, 0.08)],

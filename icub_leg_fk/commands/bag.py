@@ -23,13 +23,15 @@ from icub_leg_fk.tools.text import columns, indented
 
 EXAMPLES = """\
 Reads rosbag2 bags, split and compressed ones too, as directories or single files. Copies every
-topic as it is and adds /foot_pose_publisher/<tip>/pose after each message of joint states, byte
-for byte what the node would send; one with a zero stamp is stamped with the time it was recorded
-at. OUT is a directory, or a file if it ends in .mcap or .db3. It appears when it is complete.
+topic as it is and adds foot_pose_publisher/<tip>/pose after each message of joint states, in
+their namespace, byte for byte what the node would send; one with a zero stamp is stamped with the
+time it was recorded at. OUT is a directory, or a file if it ends in .mcap or .db3. It appears
+when it is complete. Of a CSV file or a directory of yarpdatadumper it gets the joint states, too.
 
 examples:
   leg_fk bag walking walking_with_poses
   leg_fk bag walking.mcap walking_with_poses.mcap --version v1 --foot-frame sole
+  leg_fk bag two_robots with_poses --joint-topic /icub1/joint_states
   leg_fk bag walking poses --only-poses --twist --tf --storage mcap
   leg_fk bag walking all_poses --chains left_leg right_leg head_imu=v2
   leg_fk bag monday/* --out-dir with_poses --jobs 4"""
@@ -71,8 +73,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--version',
         '--foot-frame',
         '--joint-topic',
+        '--time-unit',
         '--kinematics-file',
         '--force',
+    )
+    parser.add_argument(
+        '--namespace',
+        metavar='NAME',
+        help='of the topics that are added (default: that of the joint states)',
     )
     parser.add_argument(
         '--frame-prefix', metavar='PREFIX', default='', help='put before every frame id'
@@ -196,7 +204,9 @@ def _tasks_of_directory(
     try:
         Path(directory).mkdir(exist_ok=True)
     except OSError as error:
-        raise OutputFileError(directory, f'cannot be made: {error.strerror}') from error
+        raise OutputFileError(
+            directory, f'cannot be made: {str(error.strerror).lower()}'
+        ) from error
     endings = {name: ending for ending, name in STORAGES.items()}
     sources: dict[str, str] = {}  # by target
     for bag in bags:

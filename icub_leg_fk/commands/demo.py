@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from contextlib import closing
-from dataclasses import replace
 import os
 from pathlib import Path
 import sys
@@ -23,14 +22,15 @@ from icub_leg_fk.tools.output_file import check_target, is_bag
 from icub_leg_fk.tools.recording import JointRecording
 from icub_leg_fk.tools.replay import Answers, Replay
 from icub_leg_fk.tools.terminal import import_rich
+from icub_leg_fk.tools.tracks import ChainTrack, track_of
 import numpy as np
 
 EXAMPLES = """\
 Starts the node foot_pose_publisher in its own process, plays a synthetic walking gait, or a
 recording, to it over DDS, shows the poses of both feet as they arrive, and at the end draws them.
 It talks inside this machine only, in its own namespace, and in its own ROS_DOMAIN_ID unless
-you have set one: no robot is disturbed. Exit status 0 if every pose arrived. A recording is a CSV
-file with a column `time` in seconds and one per leg joint, in radians.
+you have set one: no robot is disturbed. Exit status 0 if every pose arrived. A recording is a bag,
+a CSV file with a column of times and one per leg joint in radians, or a log of YARP.
 
 examples:
   leg_fk demo
@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--recording',
         metavar='FILE',
         type=Path,
-        help='CSV file to play, in its own timing (default: a synthetic gait)',
+        help='recording to play, in its own timing (default: a synthetic gait)',
     )
     parser.add_argument(
         '--seconds',
@@ -115,8 +115,7 @@ def _legs(catalog: Catalog, args: argparse.Namespace) -> list[Chain]:
 
 def _recording(args: argparse.Namespace, chains: Sequence[Chain]) -> JointRecording:
     file = args.recording or config_file('examples/synthetic_walk.csv')
-    joints = [joint for chain in chains for joint in chain.joint_names]
-    recording = recordings.read_csv(file, joints)
+    recording = recordings.read_joints([file], chains)
     return recording if args.seconds is None else recording.first(args.seconds)
 
 
@@ -153,12 +152,14 @@ def _play(recording: JointRecording, chains: Sequence[Chain]) -> tuple[Replay, b
 
 def _tracks(
     recording: JointRecording, chains: Sequence[Chain], answers: Sequence[Answers]
-) -> list[recordings.ChainTrack]:
+) -> list[ChainTrack]:
     """Return the chains with the poses that have come."""
     tracks = []
     for chain, received in zip(chains, answers, strict=True):
-        track = replace(recording.track(chain), received=received.poses)
-        tracks.append(track.where(np.isfinite(received.latencies)))
+        came = np.isfinite(received.latencies)
+        times = recording.times[came]
+        positions = recording.positions_of(chain)[came]
+        tracks.append(track_of(chain, times, positions, received.poses[came]))
     return tracks
 
 

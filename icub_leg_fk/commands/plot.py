@@ -5,42 +5,64 @@ from collections.abc import Sequence
 import math
 import os
 from pathlib import Path
-import sys
 
-from icub_leg_fk.errors import InputFileError, LegFKError
+from icub_leg_fk.errors import LegFKError
+from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.tools import options
 from icub_leg_fk.tools.drawing import check_output, feet_figure, LETTERS, save_picture
-from icub_leg_fk.tools.progress import shown_progress
-from icub_leg_fk.tools.recording import ChainTrack, read_tracks, Reading, time_span
+from icub_leg_fk.tools.progress import Progress, shown_progress
+from icub_leg_fk.tools.tracks import ChainTrack, read_tracks, time_span
 import numpy as np
 
 EXAMPLES = """\
-INPUT is a rosbag2 bag (directory, .mcap or .db3) with JointState messages, or a CSV file with a
-column `time` in seconds and one column per joint, in radians; both are read by the node's own
-rules. Gaps and joints outside their ranges are marked. Where samples are closer together than can
-be drawn, a curve becomes the band from its lowest to its highest values.
+RECORDING is a rosbag2 bag (directory, .mcap or .db3), a CSV file with a column of times and one
+per joint in radians, or a directory of yarpdatadumper; several of them are parts of one robot.
+They are read by the node's own rules. Gaps and joints outside their ranges are marked. Where
+samples are closer together than can be drawn, a curve becomes the band from its lowest to its
+highest values.
 
 examples:
   leg_fk plot walking.csv
-  leg_fk plot walking_bag -o feet.pdf --at 1.5,2.0,2.5
+  leg_fk plot walking -o feet.pdf --at 1.5,2.0,2.5
+  leg_fk plot today --over yesterday --orientation
   leg_fk plot long_walk --from 120 --to 125
   leg_fk plot walking.mcap --version v1 --foot-frame sole --joint-topic /icub/joint_states
+  leg_fk plot dump/left_leg dump/right_leg -o feet.svg
   leg_fk plot arm.csv -k my_robot.yaml --chains arm"""
 
 _INSTANTS = len(LETTERS)  # at most
 _LONGEST_NAME = 50  # characters of a title
 _LIKE = 0.02  # so much of the whole movement lower, and an instant is as good as the extreme
 _LONGEST_TIME = 1e15  # s
+_SPANS_SHOWN = 4
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument('input', metavar='INPUT', help='bag or CSV file')
+    parser.add_argument(
+        'recordings',
+        metavar='RECORDING',
+        nargs='+',
+        help='bag, CSV file or directory of yarpdatadumper',
+    )
     options.add_output(
         parser,
-        'picture to write, .png, .svg or .pdf (default: the name of INPUT '
-        'with .png, in this directory)',
+        'picture to write, .png, .svg or .pdf (default: the name of '
+        'RECORDING with .png, in this directory)',
+    )
+    parser.add_argument(
+        '--over',
+        metavar='RECORDING',
+        nargs='+',
+        default=(),
+        help='another recording, over which the first is drawn',
+    )
+    parser.add_argument(
+        '--orientation',
+        action='store_true',
+        help='also draw roll, pitch and yaw, which turn a tip from its '
+        'orientation at q = 0 about the axes of the root',
     )
     options.add(
         parser,
@@ -48,6 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--version',
         '--foot-frame',
         '--joint-topic',
+        '--time-unit',
         '--kinematics-file',
     )
     parser.add_argument(
@@ -76,58 +99,88 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Draw the picture."""
-    name = os.path.basename(os.path.realpath(args.input))
+    name = _name(args.recordings)
     output = args.output or f'{Path(name).stem}.png'
     check_output(output, args.force)
-    if not Path(args.input).exists():
-        raise InputFileError(
-            args.input,
-            'there is no such file or directory; allowed: a bag or a CSV file',
-        )
     chains = options.chains_of_one_root(args)
     with shown_progress(name) as progress:
-        reading = read_tracks(args.input, chains, args.joint_topic, progress)
-    tracks = _between(reading.tracks, args.begin, args.end)
-    instants = (
-        _checked_instants(args.at, tracks) if args.at else default_instants(tracks)
-    )
-    title = _title(name, tracks)
-    save_picture(lambda: feet_figure(tracks, instants, title), output, force=args.force)
-    poses = ', '.join(_pose_count(track) for track in tracks)
-    print(f'{output}: {poses}')
-    _print_notes(reading)
+        tracks = _tracks(args.recordings, chains, args, _part(progress, 0.0))
+        over = (
+            _tracks(args.over, chains, args, _part(progress, 0.5)) if args.over else []
+        )
+        instants = (
+            _checked_instants(args.at, tracks) if args.at else default_instants(tracks)
+        )
+        title = _title(args.recordings, tracks)
+        if over:
+            title += f'   over   {_title(args.over, over)}'
+        save_picture(
+            lambda: feet_figure(
+                tracks,
+                instants,
+                title,
+                over=over,
+                over_name=_shown(args.over),
+                orientation=args.orientation,
+            ),
+            output,
+            force=args.force,
+        )
+    print(f'{output}: {", ".join(map(_pose_count, tracks))}')
     return 0
 
 
+def _tracks(
+    recordings: Sequence[str],
+    chains: Sequence[Chain],
+    args: argparse.Namespace,
+    progress: Progress | None,
+) -> list[ChainTrack]:
+    """Return what the chains did, and print what there is to say of it."""
+    reading = read_tracks(
+        recordings,
+        chains,
+        args.joint_topics,
+        progress,
+        time_unit=args.time_unit,
+        begin=args.begin,
+        end=args.end,
+    )
+    options.print_notes(reading.warnings, reading.notes)
+    return reading.tracks
+
+
 def default_instants(tracks: Sequence[ChainTrack]) -> list[float]:
-    """Return up to four times [s] worth drawing.
+    """Return up to four times of samples that are worth drawing [s].
 
     Of two feet those where one is highest above the other and farthest ahead of it, both ways;
     else, and if the feet hardly move, evenly spaced ones.
     """
-    start, end = time_span(tracks)
-    if start == end:
-        return [start]
     if len(tracks) == 2 and all((np.diff(track.times) >= 0).all() for track in tracks):
         one, two = tracks
-        instants = _far_apart(one, two, start, end)
+        instants = _far_apart(one, two)
         if len(set(instants)) == _INSTANTS:
             return sorted(instants)
-    return [float(time) for time in np.linspace(start, end, _INSTANTS)]
+    times = tracks[0].times
+    rows = np.linspace(0, len(times) - 1, _INSTANTS).round().astype(int)
+    return sorted({float(time) for time in times[rows]})
 
 
-def _far_apart(
-    one: ChainTrack, two: ChainTrack, start: float, end: float
-) -> list[float]:
+def _far_apart(one: ChainTrack, two: ChainTrack) -> list[float]:
     """Return when one foot is highest above the other and farthest ahead of it, both ways [s]."""
-    columns = [np.interp(one.times, two.times, two.poses[:, i]) for i in range(3)]
-    apart = one.poses[:, :3] - np.stack(columns, axis=1)
+    both = np.array([two.covers(time) for time in one.times.tolist()])
+    times = one.times[both]
+    if not len(times):
+        return []
+    columns = [np.interp(times, two.times, two.poses[:, i]) for i in range(3)]
+    apart = one.poses[both, :3] - np.stack(columns, axis=1)
     above, ahead = apart[:, 2], apart[:, 0]
+    start, end = time_span([one, two])
     instants = []
     for i, distance in enumerate((above, ahead, -above, -ahead)):
         # Of a gait's many steps one of the i-th quarter, so that the picture is spread out.
         quarter = start + (end - start) * (i + 0.5) / _INSTANTS
-        instants.append(_extreme_near(one.times, distance, quarter))
+        instants.append(_extreme_near(times, distance, quarter))
     return instants
 
 
@@ -138,33 +191,29 @@ def _extreme_near(times: Array, distance: Array, near: float) -> float:
     return float(like[np.abs(like - near).argmin()])
 
 
-def _between(
-    tracks: Sequence[ChainTrack], begin: float | None, end: float | None
-) -> list[ChainTrack]:
-    """Return the parts of the tracks from one time to another [s]."""
-    start, stop = time_span(tracks)
-    begin = start if begin is None else begin
-    end = stop if end is None else end
-    inside = [(track.times >= begin) & (track.times <= end) for track in tracks]
-    if not all(mask.any() for mask in inside):
-        raise LegFKError(
-            f'--from, --to: found {begin:g} to {end:g} s, in which not every chain '
-            f'has a pose; the recording goes from {start:g} to {stop:g} s'
-        )
-    return [track.where(mask) for track, mask in zip(tracks, inside)]
-
-
 def _checked_instants(
     instants: Sequence[float], tracks: Sequence[ChainTrack]
 ) -> list[float]:
-    """Return the times at which to draw the legs, in order [s]."""
+    """Return the times of the samples that are nearest to some times, in order [s]."""
+    found = []
+    for instant in instants:
+        there = [track for track in tracks if track.covers(instant)]
+        if not there:
+            raise LegFKError(
+                f'--at: found {instant:g} s, where there is no pose; allowed: '
+                f'{_spans(tracks)}'
+            )
+        found.append(float(there[0].times[there[0].nearest(instant)]))
+    return sorted(set(found))
+
+
+def _spans(tracks: Sequence[ChainTrack]) -> str:
+    """Return when there are poses, in words."""
     start, end = time_span(tracks)
-    outside = [instant for instant in instants if not start <= instant <= end]
-    if outside:
-        raise LegFKError(
-            f'--at: found {outside[0]:g} s, allowed: {start:g} to {end:g} s'
-        )
-    return sorted(instants)
+    gaps = tracks[0].gaps if len(tracks[0].gaps) < _SPANS_SHOWN else []
+    begins = [start, *(last for _, last in gaps)]
+    ends = [*(first for first, _ in gaps), end]
+    return ', '.join(f'{begin:g} to {last:g} s' for begin, last in zip(begins, ends))
 
 
 def _times(text: str) -> list[float]:
@@ -177,25 +226,36 @@ def _times(text: str) -> list[float]:
     return times
 
 
-def _title(name: str, tracks: Sequence[ChainTrack]) -> str:
-    """Return the name of the recording, if not too long, with the versions of the chains."""
-    shown = os.fsencode(name).decode(
+def _part(progress: Progress | None, begin: float) -> Progress | None:
+    """Return what takes the share of one of two recordings that is read, and tells that of all."""
+    if progress is None:
+        return None
+    return lambda share: progress(begin + 0.5 * share)
+
+
+def _name(recordings: Sequence[str]) -> str:
+    """Return the name of a recording, or of the first of its parts."""
+    return os.path.basename(os.path.realpath(recordings[0]))
+
+
+def _shown(recordings: Sequence[str]) -> str:
+    """Return the name of a recording as a picture can show it."""
+    if not recordings:
+        return ''
+    shown = os.fsencode(_name(recordings)).decode(
         errors='backslashreplace'
-    )  # a name need not be text
+    )  # it may be no text
     if len(shown) > _LONGEST_NAME:
         shown = f'{shown[:_LONGEST_NAME]}...'
+    others = len(recordings) - 1
+    return f'{shown} and {others} more' if others else shown
+
+
+def _title(recordings: Sequence[str], tracks: Sequence[ChainTrack]) -> str:
+    """Return the name of a recording, with the versions of the chains."""
     versions = ', '.join(dict.fromkeys(track.chain.version for track in tracks))
-    return f'{shown}   {versions}'
+    return f'{_shown(recordings)}   {versions}'
 
 
 def _pose_count(track: ChainTrack) -> str:
-    count = len(track.times)
-    return f'{count} pose{"s" * (count != 1)} of {track.chain.tip}'
-
-
-def _print_notes(reading: Reading) -> None:
-    """Print what a user should know of a recording, each in one line on stderr."""
-    for warning in reading.warnings:
-        print(f'leg_fk: warning: {warning}', file=sys.stderr)
-    for note in reading.notes:
-        print(f'leg_fk: note: {note}', file=sys.stderr)
+    return f'{track.count} pose{"s" * (track.count != 1)} of {track.chain.tip}'

@@ -8,11 +8,11 @@ from pathlib import Path
 import sys
 import webbrowser
 
-from icub_leg_fk.errors import InputFileError, LegFKError
+from icub_leg_fk.errors import LegFKError
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.tools import options
 from icub_leg_fk.tools.progress import shown_progress
-from icub_leg_fk.tools.recording import read_tracks
+from icub_leg_fk.tools.tracks import read_tracks
 from icub_leg_fk.tools.viewer import Source, Viewer
 from icub_leg_fk.tools.viewer_live import DEFAULT_TOPIC, live_joints
 from icub_leg_fk.tools.viewer_page import running_server
@@ -46,7 +46,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add(parser, '--version', '--foot-frame', '--kinematics-file')
     source = parser.add_mutually_exclusive_group()
     source.add_argument(
-        '--recording', metavar='FILE', type=Path, help='play a bag or a CSV file'
+        '--recording',
+        metavar='FILE',
+        type=Path,
+        help='play a bag, a CSV file or a log of YARP',
     )
     source.add_argument(
         '--live',
@@ -100,13 +103,10 @@ def _recording(
     path: Path, chains: Sequence[Chain], topic: str | None
 ) -> tuple[list[Chain], Recording]:
     """Return the chains that a recording moves, and the recording."""
-    if not path.exists():
-        raise InputFileError(str(path), 'there is no such file or directory')
+    topics = [] if topic is None else [topic]
     with shown_progress(path.name) as progress:
-        reading = read_tracks(path, chains, topic, progress)
-    for kind, lines in (('warning', reading.warnings), ('note', reading.notes)):
-        for line in lines:
-            print(f'leg_fk: {kind}: {line}', file=sys.stderr)
+        reading = read_tracks([path], chains, topics, progress)
+    options.print_notes(reading.warnings, reading.notes)
     recorded = [
         RecordedChain(track.chain, track.times, track.positions)
         for track in reading.tracks

@@ -5,14 +5,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 import os
 from pathlib import Path
+import re
 import time
 from typing import Any
 
-from icub_leg_fk.errors import InputFileError, OutputFileError
+from icub_leg_fk.errors import (
+    InputFileError,
+    LegFKError,
+    OutputFileError,
+    ParameterError,
+)
 from icub_leg_fk.kinematics import Catalog, Chain
 from icub_leg_fk.stream.configuration import (
     Configuration,
@@ -26,16 +33,20 @@ from icub_leg_fk.stream.pose_stream import PoseStream, Send, Senders
 from icub_leg_fk.tools.bags import (
     Bag,
     Connection,
+    DEFAULT_TOPIC,
     import_rosbags,
+    JOINT_STATE,
     new_bag,
     open_bag,
     reliable_qos,
     STORAGES,
 )
+from icub_leg_fk.tools.joint_states import SECOND
 from icub_leg_fk.tools.output_file import check_target, is_bag
 from icub_leg_fk.tools.progress import Progress
+from icub_leg_fk.tools.recording import parts_without_topics, Recording
 
-NODE = '/foot_pose_publisher'
+NODE = 'foot_pose_publisher'
 POSE = 'geometry_msgs/msg/PoseStamped'
 TWIST = 'geometry_msgs/msg/TwistStamped'
 TF = 'tf2_msgs/msg/TFMessage'
@@ -45,6 +56,7 @@ TF_TOPICS = (TF_TOPIC, '/tf_static')
 _POSE_DEPTH = 10
 _TF_DEPTH = 100
 _IDL = '=' * 80 + '\nIDL: '  # how a definition in that language begins
+_NAMESPACE = re.compile(r'/?([A-Za-z_]\w*(/[A-Za-z_]\w*)*/?)?', re.ASCII)
 _UNKNOWN_HASH = f'RIHS01_{"0" * 64}'
 
 
@@ -89,7 +101,9 @@ def add_foot_poses(
     foot_frame: str = DEFAULT_FRAME,
     frame_prefix: str = '',
     joint_timeout: float = DEFAULT_TIMEOUT,
-    joint_topic: str | None = None,
+    joint_topics: Sequence[str] = (),
+    time_unit: str = '',
+    namespace: str | None = None,
     twist: bool = False,
     tf: bool = False,
     only_poses: bool = False,
@@ -101,7 +115,8 @@ def add_foot_poses(
     """Copy a recording and add the poses of the feet.
 
     Args:
-        source: directory of a rosbag2 recording, or a .mcap or .db3 file.
+        source: a rosbag2 directory or a .mcap or .db3 file of one, a CSV file, or a directory of
+            yarpdatadumper.
         target: directory to make, or a file if its name ends in .mcap or .db3.
         chains: chains of the kinematics file, such as `left_leg` or `head_imu=v2`.
         version: version of every chain that is named without one; empty is its default.
@@ -109,7 +124,10 @@ def add_foot_poses(
         foot_frame: a tip frame's name.
         frame_prefix: put before every frame id.
         joint_timeout: age of a joint beside the newest of its chain that holds the chain back [s].
-        joint_topic: topic of the joint states; `/joint_states`, or the only one there is, if None.
+        joint_topics: topics of the joint states; `/joint_states`, or the only one there is, if
+            none is named.
+        time_unit: unit of the times in a CSV file; told by their size if empty.
+        namespace: where the poses are published; that of the joint states if None.
         twist: whether velocities of the tips are added, too.
         tf: whether the poses are added to /tf, too.
         only_poses: whether everything but what is added is left out.
@@ -137,12 +155,13 @@ def add_foot_poses(
     _refuse_overlap(source, target)
     storage = _chosen_storage(Path(source), Path(target), storage)
     check_target(target, force=force, may_replace=is_bag)
-    with open_bag(source) as bag:
-        joint_states = bag.joint_connections(joint_topic)
+    with _open(Path(source), configuration.chains, time_unit) as bag:
+        joints = [name for chain in configuration.chains for name in chain.joint_names]
+        joint_states = bag.joint_connections(joint_topics, joints)
+        topics = list(dict.fromkeys(each.topic for each in joint_states))
+        added = _Added(configuration, _namespace(namespace, topics))
         types = _Types()
-        old = _OldPoses(
-            bag, [] if only_poses else bag.connections, configuration, types
-        )
+        old = _OldPoses(bag, [] if only_poses else bag.connections, added, types)
         if old.found and not replace_poses:
             raise InputFileError(
                 str(source),
@@ -151,11 +170,11 @@ def add_foot_poses(
             )
         with new_bag(target, storage, force=force) as writer:
             copy = _Copy(writer, bag, old, types)
-            poses = _Poses(writer, configuration, copy, types)
+            poses = _Poses(writer, added, copy, types)
             _run(bag, joint_states, copy, poses, progress)
             look = poses.joint_input.take_look()
             _refuse_strangers(source, look, configuration.chains)
-    notes = notes_of(look, joint_states[0].topic)
+    notes = notes_of(look, ' and '.join(topics))
     return Summary(
         source=str(source),
         target=str(target),
@@ -175,9 +194,85 @@ def add_foot_poses(
             *types.notes,
             *(str(note) for note in notes if note.level != 'warning'),
         ],
-        recorded=bag.seconds,
+        recorded=(bag.span[1] - bag.span[0]) / SECOND,
         took=time.monotonic() - began,
     )
+
+
+class _Added:
+    """What is added to a recording.
+
+    Args:
+        configuration: what is to be published.
+        namespace: where; empty, or with a slash before it.
+
+    Attributes:
+        configuration: the same.
+        topics: types by topic.
+        frames: child frames of the transforms.
+    """
+
+    def __init__(self, configuration: Configuration, namespace: str) -> None:
+        self.configuration = configuration
+        self._namespace = namespace
+        self.topics: dict[str, str] = {}
+        self.frames: set[str] = set()
+        for chain in configuration.chains:
+            self.topics[self.topic(chain, 'pose')] = POSE
+            if configuration.publish_twist:
+                self.topics[self.topic(chain, 'twist')] = TWIST
+            if configuration.publish_tf:
+                self.frames.add(configuration.frame_prefix + chain.frame_id)
+        if configuration.publish_tf:
+            self.topics[TF_TOPIC] = TF
+
+    def topic(self, chain: Chain, what: str) -> str:
+        """Return the topic of a chain's poses or twists."""
+        return f'{self._namespace}/{NODE}/{chain.tip}/{what}'
+
+
+class _NoBag:
+    """A recording that is no bag, like a bag with joint states alone."""
+
+    def __init__(self, recording: Recording) -> None:
+        rosbags = import_rosbags()
+        types = rosbags.typesys.get_typestore(rosbags.typesys.Stores.ROS2_JAZZY)
+        text, _ = types.generate_msgdef(JOINT_STATE, ros_version=2)
+        form = rosbags.interfaces.MessageDefinitionFormat.MSG
+        self._recording = recording
+        self.connections = [
+            rosbags.interfaces.Connection(
+                id=1,
+                topic=DEFAULT_TOPIC,
+                msgtype=JOINT_STATE,
+                msgdef=rosbags.interfaces.MessageDefinition(form, text),
+                digest=types.hash_rihs01(JOINT_STATE),
+                msgcount=0,
+                ext=rosbags.interfaces.ConnectionExtRosbag2(
+                    'cdr', [reliable_qos(_POSE_DEPTH)]
+                ),
+                owner=None,
+            )
+        ]
+        self.custom_data: dict[str, str] = {}
+        self.notes = recording.notes
+        self.span = recording.span()
+
+    def joint_connections(
+        self, topics: Sequence[str], joints: Iterable[str]
+    ) -> list[Connection]:
+        """Return the only connection; refuse topics, which there are none of."""
+        if topics:
+            raise LegFKError(f'--joint-topic: {self._recording.name} has no topics')
+        return self.connections
+
+    def messages(
+        self, connections: Iterable[Connection], progress: Progress | None = None
+    ) -> Iterator[tuple[Connection, int, bytes]]:
+        """Yield connection, time [ns] and CDR bytes of each message, if it is asked for."""
+        for connection in connections:
+            for stamp, data in self._recording.messages(progress):
+                yield connection, stamp, data
 
 
 class _Types:
@@ -248,16 +343,16 @@ class _OldPoses:
 
     def __init__(
         self,
-        bag: Bag,
+        bag: Bag | _NoBag,
         connections: Iterable[Connection],
-        configuration: Configuration,
+        added: _Added,
         types: _Types,
     ) -> None:
-        topics = _added_topics(configuration).keys() - {TF_TOPIC}
+        topics = added.topics.keys() - {TF_TOPIC}
         poses = [each for each in connections if each.topic in topics]
         self.kept = [each for each in connections if each.topic not in topics]
         self.transforms: set[int] = set()
-        self.frames = _added_frames(configuration)
+        self.frames = added.frames
         self.found = list(dict.fromkeys(each.topic for each in poses))
         for connection in self.kept:
             is_tf = connection.topic in TF_TOPICS and connection.msgtype == TF
@@ -265,13 +360,14 @@ class _OldPoses:
                 self._look_for_frames(bag, connection, types)
         self.notes = [f'left out: {each} of the recording' for each in self.found]
 
-    def _look_for_frames(self, bag: Bag, connection: Connection, types: _Types) -> None:
+    def _look_for_frames(
+        self, bag: Bag | _NoBag, connection: Connection, types: _Types
+    ) -> None:
         sought = {frame.encode() + b'\0': frame for frame in self.frames}
         found: set[str] = set()
         for _, _, data in bag.messages([connection]):
-            if any(
-                name in data for name in sought
-            ):  # which is fast, but `a/x` has `x`, too
+            may_have = any(name in data for name in sought)  # `a/x` has `x`, too
+            if may_have:
                 found.update(self.frames.intersection(types.frames(data)))
         if found:
             self.transforms.add(connection.id)
@@ -286,7 +382,9 @@ class _Copy:
         connections: those of the new recording, by the ids of the old ones.
     """
 
-    def __init__(self, writer: Any, bag: Bag, old: _OldPoses, types: _Types) -> None:
+    def __init__(
+        self, writer: Any, bag: Bag | _NoBag, old: _OldPoses, types: _Types
+    ) -> None:
         for name, value in bag.custom_data.items():
             writer.set_custom_data(name, str(value))
         self.count = 0
@@ -323,9 +421,8 @@ class _Poses:
         added: messages written, by topic.
     """
 
-    def __init__(
-        self, writer: Any, configuration: Configuration, copy: _Copy, types: _Types
-    ) -> None:
+    def __init__(self, writer: Any, added: _Added, copy: _Copy, types: _Types) -> None:
+        configuration = added.configuration
         self._time = 0  # when the present message was recorded [ns]
         self.joint_input = JointInput(lambda: self._time)
         self.joint_input.configure(
@@ -333,11 +430,10 @@ class _Poses:
             configuration.joint_timeout,
             velocities=configuration.publish_twist,
         )
-        topics = _added_topics(configuration)
-        self.added = dict.fromkeys(topics, 0)
+        self.added = dict.fromkeys(added.topics, 0)
         there = {(each.topic, each.msgtype): each for each in copy.connections.values()}
         send = {}
-        for topic, kind in topics.items():
+        for topic, kind in added.topics.items():
             connection = there.get((topic, kind))
             if connection is None:
                 depth = _TF_DEPTH if topic == TF_TOPIC else _POSE_DEPTH
@@ -350,7 +446,7 @@ class _Poses:
             send[topic] = self._sender(writer, connection)
         senders = {
             chain.name: Senders(
-                send[_topic(chain, 'pose')], send.get(_topic(chain, 'twist'))
+                send[added.topic(chain, 'pose')], send.get(added.topic(chain, 'twist'))
             )
             for chain in configuration.chains
         }
@@ -379,7 +475,7 @@ class _Poses:
 
 
 def _run(
-    bag: Bag,
+    bag: Bag | _NoBag,
     joint_states: Iterable[Connection],
     copy: _Copy,
     poses: _Poses,
@@ -396,29 +492,37 @@ def _run(
             poses.take(timestamp, data)
 
 
-def _added_topics(configuration: Configuration) -> dict[str, str]:
-    """Return the topics that are added, with their types."""
-    topics = {}
-    for chain in configuration.chains:
-        topics[_topic(chain, 'pose')] = POSE
-        if configuration.publish_twist:
-            topics[_topic(chain, 'twist')] = TWIST
-    if configuration.publish_tf:
-        topics[TF_TOPIC] = TF
-    return topics
+@contextmanager
+def _open(
+    path: Path, chains: Sequence[Chain], time_unit: str
+) -> Iterator[Bag | _NoBag]:
+    """Give a recording for reading, as a bag or like one."""
+    parts = parts_without_topics(path, chains, time_unit)
+    if parts:
+        yield _NoBag(Recording(parts))
+        return
+    with open_bag(path) as bag:
+        yield bag
 
 
-def _topic(chain: Chain, what: str) -> str:
-    return f'{NODE}/{chain.tip}/{what}'
+def _namespace(namespace: str | None, topics: Sequence[str]) -> str:
+    """Return the namespace of the poses: empty, or with a slash before it.
 
-
-def _added_frames(configuration: Configuration) -> set[str]:
-    """Return the child frames of the transforms that are added."""
-    if not configuration.publish_tf:
-        return set()
-    return {
-        configuration.frame_prefix + chain.frame_id for chain in configuration.chains
-    }
+    Raises:
+        ParameterError: it is no name of ROS.
+    """
+    if namespace is None:
+        return os.path.commonpath([os.path.dirname(topic) for topic in topics]).rstrip(
+            '/'
+        )
+    if not _NAMESPACE.fullmatch(namespace):
+        raise ParameterError(
+            'namespace',
+            f'found {namespace!r}, allowed: words of letters, '
+            'digits and underscores, separated by slashes',
+        )
+    words = namespace.strip('/')
+    return f'/{words}' if words else ''
 
 
 def _refuse_strangers(source: str | Path, look: Look, chains: Iterable[Chain]) -> None:
@@ -459,4 +563,4 @@ def _chosen_storage(source: Path, target: Path, storage: str) -> str:
     if named or storage:
         return named or storage
     files = source.iterdir() if source.is_dir() else (source,)
-    return 'mcap' if any('.mcap' in file.suffixes for file in files) else 'sqlite3'
+    return 'sqlite3' if any('.db3' in file.suffixes for file in files) else 'mcap'

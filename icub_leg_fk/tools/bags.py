@@ -7,8 +7,9 @@ files. What it would pass over, or refuse without a name, is looked at first.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from itertools import islice
 import os
 from pathlib import Path
 import re
@@ -17,7 +18,14 @@ import tempfile
 from types import ModuleType
 from typing import Any
 
-from icub_leg_fk.errors import InputFileError, MissingDependencyError, OutputFileError
+from icub_leg_fk.errors import (
+    InputFileError,
+    MalformedMessageError,
+    MissingDependencyError,
+    OutputFileError,
+)
+from icub_leg_fk.stream.cdr import read_layout
+from icub_leg_fk.tools.input_file import first_bytes
 from icub_leg_fk.tools.output_file import is_bag, whole_path
 from icub_leg_fk.tools.progress import Progress
 import yaml
@@ -34,6 +42,7 @@ _MEND = {
     '.db3': '`ros2 bag reindex` may mend it',
 }
 _CLEAN = re.compile(r'/?(?!/)[A-Za-z0-9._/ +@:,=-]*')  # what also sqlite takes as it is
+_MOST_METADATA = 1 << 24  # bytes
 _TAIL = 1 << 20  # bytes of an MCAP file, with its summary
 _MCAP_TOPIC = re.compile(
     rb'([!-~]+)[\4\x08\x0a]\0\0\0(json|ros1|cbor|protobuf|flatbuffer)'
@@ -91,7 +100,7 @@ class Bag:
         connections: its topics as metadata.yaml describes them, or as the files do what it leaves
             out; each with the number of messages that the files hold.
         custom_data: what its metadata keeps by name.
-        seconds: time from the first to the last message [s].
+        span: time of the first and the last message [ns].
         notes: what a user should know of it, one line each.
     """
 
@@ -117,26 +126,64 @@ class Bag:
         self._connection_of = {id_: counted[each.id] for id_, each in pairs.items()}
         self.connections = list(counted.values())
         self.custom_data = dict(reader.storage.metadata.custom or {})
-        self.seconds = max(0, reader.duration - 1) / 1e9
+        self.span = (reader.start_time, max(reader.start_time, reader.end_time - 1))
         self.notes = _notes_on_counts(reader.message_count, listed, self.connections)
 
-    def joint_connections(self, topic: str | None) -> list[Connection]:
-        """Return those of a topic of joint states, or of `/joint_states`, or of the only one.
+    def joint_connections(
+        self, topics: Sequence[str], joints: Iterable[str]
+    ) -> list[Connection]:
+        """Return those of topics of joint states, or of `/joint_states`, or of the only one.
+
+        Args:
+            topics: the topics; the default if none is named.
+            joints: the joints that are looked for; a refusal says on which topics they are.
 
         Raises:
-            InputFileError: there are no joint states on it; lists the topics that have some.
+            InputFileError: there are no joint states on one of them; lists the others.
         """
-        connections = [each for each in self.connections if each.msgtype == JOINT_STATE]
-        known = sorted({each.topic for each in connections})
-        chosen = topic or (known[0] if len(known) == 1 else DEFAULT_TOPIC)
-        if chosen not in known:
-            there = f'it has no topic of type {JOINT_STATE}'
-            if known:
-                there = f'--joint-topic can be {", ".join(known)}'
-            raise InputFileError(
-                str(self.path), f'no joint states on {chosen}; {there}'
-            )
-        return [each for each in connections if each.topic == chosen]
+        known = self.joint_topics()
+        chosen = list(topics) or (known if len(known) == 1 else [DEFAULT_TOPIC])
+        for topic in chosen:
+            if topic not in known:
+                fault = f'no joint states on {topic}; {self.topics_of(joints)}'
+                raise InputFileError(str(self.path), fault)
+        return [
+            each
+            for each in self.connections
+            if each.topic in chosen and each.msgtype == JOINT_STATE
+        ]
+
+    def topics_of(self, joints: Iterable[str]) -> str:
+        """Return the topics of joint states in words, those with some joints by themselves."""
+        known = self.joint_topics()
+        if not known:
+            return f'it has no topic of type {JOINT_STATE}'
+        wanted = set(joints)
+        fitting = [name for name in known if wanted & set(self.joint_names([name]))]
+        if not fitting or fitting == known:
+            return f'--joint-topic can be {", ".join(known)}'
+        others = [name for name in known if name not in fitting]
+        return (
+            f'--joint-topic can be {", ".join(fitting)} (which has joints of these chains), '
+            f'{", ".join(others)}'
+        )
+
+    def joint_names(self, topics: Collection[str]) -> tuple[str, ...]:
+        """Return the joints that the first messages of some topics have."""
+        names: dict[str, None] = {}
+        for each in self.connections:
+            if each.topic not in topics or each.msgtype != JOINT_STATE:
+                continue
+            for _, _, data in islice(self.messages([each]), 1):
+                with suppress(MalformedMessageError):
+                    names.update(dict.fromkeys(read_layout(data).names))
+        return tuple(names)
+
+    def joint_topics(self) -> list[str]:
+        """Return the topics of joint states."""
+        return sorted(
+            {each.topic for each in self.connections if each.msgtype == JOINT_STATE}
+        )
 
     def messages(
         self, connections: Iterable[Connection], progress: Progress | None = None
@@ -301,6 +348,8 @@ def _reason_and_mend(directory: Path, reason: str) -> tuple[str, str]:
     is_mcap = any('.mcap' in name for name in names)
     is_sqlite = any('.db3' in name for name in names)
     if METADATA in names:
+        if 'version' in reason:
+            return reason, 'a newer rosbags may read it; its files alone can be given'
         if not is_mcap and not is_sqlite:
             return reason, 'its files must stand beside it'
         return reason, _MEND['.mcap' if is_mcap else '.db3']
@@ -325,7 +374,7 @@ def _refuse_other_recordings(path: Path) -> None:
             str(path),
             'is a compressed file alone; give its directory, or decompress it: zstd -d',
         )
-    elif _first_bytes(path, 7) == b'#ROSBAG':
+    elif first_bytes(path, 7) == b'#ROSBAG':
         raise InputFileError(
             str(path), 'is a ROS 1 bag; `rosbags-convert` makes a ROS 2 recording of it'
         )
@@ -396,7 +445,7 @@ def _encodings_of_other_mcap(file: Path) -> dict[str, str]:
 
     rosbags tells no more of such a file than that its profile is another.
     """
-    head = _first_bytes(file, 4096)
+    head = first_bytes(file, 4096)
     profile_end = 21 + int.from_bytes(head[17:21], 'little')
     profile = head[21:profile_end]
     if profile == b'ros2' or not head.startswith(b'\x89MCAP0\r\n'):
@@ -411,14 +460,11 @@ def _encodings_of_other_mcap(file: Path) -> dict[str, str]:
     }
 
 
-def _first_bytes(file: Path, count: int) -> bytes:
-    with file.open('rb') as stream:
-        return stream.read(count)
-
-
 def _clean_path(path: Path, scratch: Path) -> Path:
     """Return a path that every library takes: itself, or links to it in a scratch directory."""
-    if _CLEAN.fullmatch(str(path)):
+    metadata = path / METADATA
+    is_plain = not metadata.is_file() or first_bytes(metadata, _MOST_METADATA).isascii()
+    if is_plain and _CLEAN.fullmatch(str(path)):
         return path
     ending = path.suffix if path.suffix in STORAGES else ''
     clean = scratch / f'bag{ending}'
@@ -428,4 +474,9 @@ def _clean_path(path: Path, scratch: Path) -> Path:
     clean.mkdir()
     for entry in path.iterdir():
         (clean / entry.name).symlink_to(entry.resolve())
+    if not is_plain:  # rosbags reads it in the encoding of the locale, whatever that is
+        with suppress(yaml.YAMLError):
+            escaped = yaml.safe_dump(yaml.safe_load(metadata.read_bytes()))
+            (clean / METADATA).unlink()
+            (clean / METADATA).write_text(escaped)
     return clean

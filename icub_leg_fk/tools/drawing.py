@@ -12,53 +12,59 @@ import math
 import os
 from pathlib import Path
 from types import ModuleType
-from typing import Any, NamedTuple, TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 from icub_leg_fk.errors import LegFKError, MissingDependencyError, OutputFileError
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.stream.colors import color_of
 from icub_leg_fk.tools.output_file import check_target, whole_path
-from icub_leg_fk.tools.recording import ChainTrack, time_span
+from icub_leg_fk.tools.space import Box, FAINT, GRID, Space
+from icub_leg_fk.tools.tracks import ChainTrack, COORDINATES, OutOfRange, time_span
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from mpl_toolkits.mplot3d import Axes3D
+    from matplotlib.text import Text
 
 FORMATS = ('.png', '.svg', '.pdf')
-AXIS_COLORS = (
-    '#d62728',
-    '#2ca02c',
-    '#1f5fd0',
-)  # x red, y green, z blue, as viewers have it
 INK = '#222222'
-FAINT = '#6f6f6f'
-GRID = '#dddddd'
-FLOOR = '#f7f7f7'
 MINUS = '\N{MINUS SIGN}'
 LETTERS = 'ABCD'  # of the instants at which the chains are drawn
 
-_WIDTH = 13.333  # inches, of a slide
-_HEIGHT = 7.5
-_ROW = 0.3  # inches, of a bar and its name
+# Lengths are inches. From the top: title, notes, legend, and panels below each other; beside them
+# the chains in space.
+_TITLE = 0.35
+_NOTES = 0.78
+_LEGEND = 1.1
+_TOP = 1.3
+_LEFT = 1.0
+_PANEL = 5.65
+_BETWEEN = 1.0  # two columns of panels
+_SCENES = 6.2
+_TALLEST = 6.5  # of the scenes
+_BESIDE = 0.45  # panels and scenes
+_MARGIN = 0.15
+_CURVE = 1.4  # height of a panel of curves
+_HEADING = 0.4  # of a panel, above it
+_LETTER = 0.2  # of the instants, above the first panel
+_BAR_ROW = 0.36  # a bar and its name
+_FOOT = 0.62
 _COLUMNS = 800  # of a panel
 _MOST_SAMPLES = 4 * _COLUMNS  # of a curve; more cannot be seen and become a band
-_GAP = 5.0  # so many usual intervals without a pose are a gap
 _TRAIL = 0.5  # s of a tip's path before and after an instant
-_COORDINATES = {
-    'z': 2,
-    'x': 0,
-    'y': 1,
-}  # in the order of their panels, with their columns
+_POSITION = ('z', 'x', 'y')
+_ORIENTATION = ('roll', 'pitch', 'yaw')
+_LEAST_SPANS = (0.01, 1.0)  # m and deg; smaller movements are hardly meant to be seen
+_LONGEST_NAME = 45  # characters of a joint's
 _SETTINGS: dict[str, Any] = {
     'font.family': 'sans-serif',
     'font.sans-serif': ['DejaVu Sans'],
     'font.size': 12,
     'axes.titlesize': 12,
     'axes.titleweight': 'bold',
+    'axes.titlelocation': 'left',
     'axes.edgecolor': FAINT,
     'axes.spines.top': False,
     'axes.spines.right': False,
@@ -78,29 +84,16 @@ _SETTINGS: dict[str, Any] = {
 }
 
 
-class OutOfRange(NamedTuple):
-    """A joint beyond one end of its range.
-
-    Attributes:
-        chain: whose joint it is.
-        text: which end of which joint: `l_knee > 4°`.
-        spans: when it was there, from and to [s].
-    """
-
-    chain: Chain
-    text: str
-    spans: list[tuple[float, float]]
-
-
-def import_matplotlib() -> tuple[ModuleType, ModuleType]:
-    """Return the package matplotlib, which draws figures, and its module of things in space."""
+def import_matplotlib() -> ModuleType:
+    """Return the package matplotlib with its modules of figures, lines and bitmaps."""
     os.environ |= {'MPLBACKEND': 'agg', 'MATPLOTLIBRC': os.devnull}
     logging.getLogger('matplotlib').setLevel(
         logging.CRITICAL
     )  # what it says of a matplotlibrc
     try:
+        import matplotlib.backends.backend_agg
         import matplotlib.figure
-        from mpl_toolkits.mplot3d import art3d
+        import matplotlib.lines
     except ImportError as error:
         raise MissingDependencyError(
             'matplotlib',
@@ -114,13 +107,13 @@ def import_matplotlib() -> tuple[ModuleType, ModuleType]:
             f'matplotlib cannot be imported: {error}; is there a file matplotlibrc '
             'in this directory?'
         ) from error
-    return matplotlib, art3d
+    return matplotlib
 
 
 @contextmanager
-def _own_settings() -> Iterator[None]:
+def own_settings() -> Iterator[None]:
     """Let matplotlib draw with its defaults and this module's settings."""
-    matplotlib, _ = import_matplotlib()
+    matplotlib = import_matplotlib()
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(_SETTINGS)
@@ -145,7 +138,7 @@ def save_picture(
     kind = Path(path).suffix.lower().lstrip('.')
     no_date = {'svg': {'Date': None}, 'pdf': {'CreationDate': None}}
     try:
-        with _own_settings(), whole_path(path, force=force) as new:
+        with own_settings(), whole_path(path, force=force) as new:
             draw().savefig(new, format=kind, dpi=dpi, metadata=no_date.get(kind))
     except ValueError as error:
         raise LegFKError(f'{path}: cannot be drawn: {error}') from error
@@ -153,13 +146,20 @@ def save_picture(
 
 def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure of a size in inches."""
-    matplotlib, _ = import_matplotlib()
+    matplotlib = import_matplotlib()
     figure: Figure = matplotlib.figure.Figure(figsize=(width, height))
+    matplotlib.backends.backend_agg.FigureCanvasAgg(figure)  # which can measure text
     return figure
 
 
 def feet_figure(
-    tracks: Sequence[ChainTrack], instants: Sequence[float], title: str
+    tracks: Sequence[ChainTrack],
+    instants: Sequence[float],
+    title: str,
+    *,
+    over: Sequence[ChainTrack] = (),
+    over_name: str = '',
+    orientation: bool = False,
 ) -> Figure:
     """Return the tips over time, and beside them the chains in space.
 
@@ -167,257 +167,89 @@ def feet_figure(
         tracks: what the chains did.
         instants: up to four times at which the chains are drawn [s].
         title: what stands above.
+        over: what chains did in another recording, over which the first is drawn.
+        over_name: name of that recording.
+        orientation: whether roll, pitch and yaw are drawn, too.
     """
-    outside = [each for track in tracks for each in outside_ranges(track)]
-    height = _HEIGHT + _ROW * max(0, len(outside) - 1)
-    figure = new_figure(_WIDTH, height)
-    _draw_time(figure, tracks, instants, outside)
-    space = _draw_scenes(figure, tracks, instants)
-    frames = [tracks[0].chain.root_frame]
-    frames += [track.chain.frame_id for track in tracks]
-    named = ', '.join(dict.fromkeys(frames))
-    figure.text(0.03, 1 - 0.35 / height, title, fontsize=19, weight='bold', va='center')
-    small: dict[str, Any] = {'fontsize': 10.5, 'va': 'center', 'color': FAINT}
-    figure.text(
-        0.03, 1 - 0.8 / height, _notes(tracks, bool(outside)), ha='left', **small
-    )
-    figure.text(
-        0.985,
-        1 - 0.8 / height,
-        f'axes of {named};  squares of {space.step:g} m',
-        ha='right',
-        **small,
-    )
+    outside = [each for track in tracks for each in track.outside]
+    columns = (_POSITION, _ORIENTATION) if orientation else (_POSITION,)
+    layout = _Layout(len(columns), len(outside))
+    figure = new_figure(layout.width, layout.height)
+    panels = []
+    for i, names in enumerate(columns):
+        panels.append(_draw_tips(figure, layout, i, names, tracks, over))
+    for column in panels:
+        _mark_instants(column, instants)
+    if outside:
+        panels[0].append(layout.panel(figure, 0, len(_POSITION), panels[0][0]))
+        _draw_outside_ranges(panels[0][-1], outside)
+    for column in panels:
+        column[-1].tick_params(labelbottom=True)
+        column[-1].set_xlabel('time [s]')
+    step = _draw_scenes(figure, layout.scenes, tracks, over, instants)
+    _draw_legend(figure, layout, tracks, over, over_name)
+    notes = _notes(tracks, bool(outside))
+    _draw_words(figure, layout, title, notes, _notes_on_space(tracks, step))
     return figure
 
 
-def outside_ranges(track: ChainTrack) -> list[OutOfRange]:
-    """Return when joints were beyond an end of their range."""
-    chain = track.chain
-    found = []
-    for name, link, q in zip(
-        chain.joint_names, chain.joints, track.positions.T, strict=True
-    ):
-        lower, upper = link.limits
-        for is_outside, sign, limit in (
-            (q < lower, '<', lower),
-            (q > upper, '>', upper),
-        ):
-            if is_outside.any():
-                value = (
-                    f'{limit:g} m' if link.is_prismatic else f'{math.degrees(limit):g}°'
-                )
-                text = f'{name} {sign} {value}'.replace('-', MINUS)
-                found.append(OutOfRange(chain, text, _spans(track.times, is_outside)))
-    return found
-
-
-def gaps(tracks: Sequence[ChainTrack]) -> list[tuple[float, float]]:
-    """Return the spans [s] in which a chain has no pose although it should, each once."""
-    found = set()
-    for track in tracks:
-        for after in _breaks(track.times):
-            before = after - 1
-            begin, end = track.times[[before, after]].tolist()
-            if end > begin:
-                found.add((begin, end))
-    return sorted(found)
-
-
-class Space:
-    """A view of a part of space in parallel projection, in which every direction keeps its scale.
-
-    It shows some points and the root's axes above a floor of squares.
+class _Layout:
+    """Where things are in a figure [inches].
 
     Args:
-        figure: where it is drawn.
-        place: its part of the figure, of a grid of matplotlib.
-        points: (N, 3) points of the root frame that are to be seen [m].
-        azimuth: where the viewer stands [deg].
-        elevation: how high the viewer stands [deg].
-        zoom: how large things are.
+        columns: columns of panels.
+        bars: joints and ends of their ranges that have a bar.
 
     Attributes:
-        axes: matplotlib's axes.
-        step: side of a square of the floor [m].
+        width: of the figure.
+        height: of the figure.
+        scenes: where the chains are drawn in space.
     """
 
-    def __init__(
-        self,
-        figure: Figure,
-        place: Any,
-        points: Array,
-        azimuth: float = 210.0,
-        elevation: float = 18.0,
-        zoom: float = 1.15,
-    ) -> None:
-        self.axes: Axes3D = figure.add_subplot(
-            place, projection='3d', proj_type='ortho', computed_zorder=False
+    def __init__(self, columns: int, bars: int) -> None:
+        self._bars = bars
+        beside = _LEFT + columns * _PANEL + (columns - 1) * _BETWEEN + _BESIDE
+        self.width = beside + _SCENES + _MARGIN
+        height = _TOP + _LETTER + 3 * (_HEADING + _CURVE) + _FOOT
+        if bars:
+            height += _HEADING + bars * _BAR_ROW
+        self.height = height
+        tall = min(height - _TOP + 0.1 - _MARGIN, _TALLEST)
+        self.scenes = Box(beside, height - _TOP + 0.1 - tall, _SCENES, tall)
+
+    def panel(self, figure: Figure, column: int, row: int, share: Axes | None) -> Axes:
+        """Return the axes of a row, from the top, of which the fourth is for bars."""
+        top = self.height - _TOP - _LETTER - row * (_HEADING + _CURVE) - _HEADING
+        height = self._bars * _BAR_ROW if row == len(_POSITION) else _CURVE
+        left = _LEFT + column * (_PANEL + _BETWEEN)
+        rectangle = (
+            left / self.width,
+            (top - height) / self.height,
+            _PANEL / self.width,
+            height / self.height,
         )
-        self.axes.view_init(elevation, azimuth)
-        self.axes.set_axis_off()
-        az = math.radians(azimuth)
-        el = math.radians(elevation)
-        self._toward_viewer = np.array(
-            [math.cos(el) * math.cos(az), math.cos(el) * math.sin(az), math.sin(el)]
-        )
-        self._rightward = np.array([-math.sin(az), math.cos(az), 0.0])
-        points = np.vstack((points, np.zeros((1, 3))))
-        self.step = step = _round_step(float(np.ptp(points, axis=0).max()) / 7)
-        lowest = np.floor(points.min(axis=0) / step - 1) * step
-        highest = np.ceil(points.max(axis=0) / step + 1) * step
-        lowest[2] = points[:, 2].min()
-        for axis, low, high in zip('xyz', lowest.tolist(), highest.tolist()):
-            self.axes.set(**{f'{axis}lim': (low, high)})
-        self.axes.set_box_aspect(highest - lowest, zoom=zoom)
-        self._draw_floor(lowest, highest)
-
-    def depth(self, points: Array) -> float:
-        """Return how near the middle of some points is to the viewer [m]; larger is nearer."""
-        return float(np.mean(points @ self._toward_viewer))
-
-    def line(self, points: ArrayLike, **style: Any) -> None:
-        """Draw a line through (N, 3) points of the root frame."""
-        self.axes.plot(*np.transpose(points), clip_on=False, **style)
-
-    def fill(
-        self, corners: ArrayLike, color: str, zorder: float, alpha: float = 1.0
-    ) -> None:
-        """Fill a polygon of (N, 3) corners."""
-        _, art3d = import_matplotlib()
-        self.axes.add_collection3d(
-            art3d.Poly3DCollection(
-                [np.asarray(corners)],
-                facecolor=color,
-                alpha=alpha,
-                zorder=zorder,
-                clip_on=False,
-            )
-        )
-
-    def frame(
-        self,
-        T: Array,
-        length: float,
-        zorder: float,
-        width: float = 2.0,
-        labels: Sequence[str] = 'xyz',
-        size: float = 9.0,
-    ) -> None:
-        """Draw the axes of a (4, 4) frame with their names, the nearest last."""
-        origin = T[:3, 3]
-        for i in sorted(range(3), key=lambda i: self.depth(T[:3, i])):
-            axis = T[:3, i]
-            color = AXIS_COLORS[i]
-            self.axes.quiver(
-                *origin,
-                *(length * axis),
-                color=color,
-                clip_on=False,
-                linewidth=width,
-                arrow_length_ratio=0.3,
-                zorder=zorder,
-            )
-            self.axes.text(
-                *(origin + 1.2 * length * axis),
-                labels[i],
-                fontsize=size,
-                color=color,
-                weight='bold',
-                va='center',
-                ha=self._side(axis),
-                zorder=zorder + 1,
-            )
-
-    def chain(self, chain: Chain, q: ArrayLike, zorder: float) -> None:
-        """Draw a chain's skeleton from the root to its tip, its joints, and its sole if any."""
-        points = chain.frames(q)[:, :3, 3]
-        color = color_of(chain)
-        self.line(
-            [(0.0, 0.0, 0.0), points[0]],
-            color=FAINT,
-            linewidth=2.5,
-            zorder=zorder,
-            linestyle=(0, (2, 1.2)),
-        )
-        corners = chain.sole_outline(q)
-        if corners is not None:
-            self.fill(corners, color, zorder, 0.3)
-        self.line(points, color='white', linewidth=8, zorder=zorder + 1)
-        self.line(
-            points, color=color, linewidth=4, zorder=zorder + 2, solid_joinstyle='round'
-        )
-        self.line(
-            points[:-1],
-            color=color,
-            linestyle='',
-            marker='o',
-            markersize=6.5,
-            markerfacecolor='white',
-            markeredgewidth=1.8,
-            zorder=zorder + 3,
-        )
-
-    def _side(self, axis: Array) -> str:
-        """Return how text at the end of an axis is aligned to stay clear of it."""
-        aside = float(axis @ self._rightward)
-        if abs(aside) < 0.3:
-            return 'center'
-        return 'left' if aside > 0 else 'right'
-
-    def _draw_floor(self, lowest: Array, highest: Array) -> None:
-        """Draw the squares of the floor between two (3,) corners."""
-        low = lowest[2]
-        x0, y0 = lowest[:2]
-        xs = np.arange(x0, highest[0] + self.step / 2, self.step)
-        ys = np.arange(y0, highest[1] + self.step / 2, self.step)
-        x1, y1 = xs[-1], ys[-1]
-        self.fill(
-            [(x0, y0, low), (x1, y0, low), (x1, y1, low), (x0, y1, low)], FLOOR, 0
-        )
-        style: dict[str, Any] = {'color': GRID, 'linewidth': 1, 'zorder': 1}
-        for x in xs:
-            self.line([(x, y0, low), (x, y1, low)], **style)
-        for y in ys:
-            self.line([(x0, y, low), (x1, y, low)], **style)
+        return figure.add_axes(rectangle, sharex=share)
 
 
-def _draw_time(
+def _draw_tips(
     figure: Figure,
+    layout: _Layout,
+    column: int,
+    names: Sequence[str],
     tracks: Sequence[ChainTrack],
-    instants: Sequence[float],
-    outside: Sequence[OutOfRange],
-) -> None:
-    """Draw the tips' coordinates, and when joints were outside their ranges, over time."""
-    height = figure.get_figheight()
-    ratios = [1.0] * len(_COORDINATES)
-    if outside:
-        ratios.append(_ROW * (len(outside) + 0.3) / 1.6)
-    panels = figure.subplots(
-        len(ratios),
-        sharex=True,
-        gridspec_kw={
-            'left': 0.075,
-            'right': 0.5,
-            'top': 1 - 1.35 / height,
-            'bottom': 0.65 / height,
-            'hspace': 0.42,
-            'height_ratios': ratios,
-        },
-    )
-    _draw_tips(panels[: len(_COORDINATES)], tracks)
-    if outside:
-        _draw_outside_ranges(panels[-1], outside)
-    panels[-1].set_xlabel('time [s]')
-    _mark_instants(panels[: len(_COORDINATES)], instants)
-
-
-def _draw_tips(panels: Sequence[Axes], tracks: Sequence[ChainTrack]) -> None:
-    """Draw a coordinate of all tips in each panel."""
-    bars = [(begin, end - begin) for begin, end in gaps(tracks)]
-    for panel, (name, column) in zip(panels, _COORDINATES.items(), strict=True):
-        for track in tracks:
-            _draw_curve(panel, track, column)
+    over: Sequence[ChainTrack],
+) -> list[Axes]:
+    """Draw a coordinate of all tips in each panel of a column."""
+    panels: list[Axes] = []
+    gaps = {gap for track in tracks for gap in track.gaps}
+    bars = [(begin, end - begin) for begin, end in sorted(gaps)]
+    start, end = time_span([*tracks, *over])
+    if start == end:
+        start, end = start - 0.5, end + 0.5
+    for row, name in enumerate(names):
+        panel = layout.panel(figure, column, row, panels[0] if panels else None)
+        panels.append(panel)
+        _draw_curves(panel, name, tracks, over)
         panel.broken_barh(
             bars,
             (0, 1),
@@ -426,160 +258,213 @@ def _draw_tips(panels: Sequence[Axes], tracks: Sequence[ChainTrack]) -> None:
             linewidth=0,
             transform=panel.get_xaxis_transform(),
         )
-        panel.set_title(f'{name} in {tracks[0].chain.root_frame} [m]', loc='left')
+        panel.set_title(
+            _heading(name, tracks[0].chain),
+            loc='left',
+            pad=6 if row else 6 + _LETTER * 72,
+        )
         panel.margins(x=0, y=0.12)
+        _show_no_noise(panel, _LEAST_SPANS[name in _ORIENTATION])
         panel.locator_params(axis='y', nbins=4)
-    start, end = time_span(tracks)
-    if start == end:
-        start, end = start - 0.5, end + 0.5
+        panel.ticklabel_format(style='plain', useOffset=False)
+        panel.tick_params(labelbottom=False)
     panels[0].set_xlim(start, end)
-    panels[0].legend(
-        loc='lower right',
-        bbox_to_anchor=(1.0, 0.97),
-        ncols=len(tracks),
-        fontsize=11,
-        borderpad=0,
-        handlelength=1.2,
-        columnspacing=1.2,
-    )
+    return panels
 
 
-def _draw_curve(panel: Axes, track: ChainTrack, column: int) -> None:
+def _show_no_noise(panel: Axes, least: float) -> None:
+    """Let the values of a panel span so much at least."""
+    low, high = panel.get_ylim()
+    missing = least - (high - low)
+    if missing > 0:
+        panel.set_ylim(low - missing / 2, high + missing / 2)
+
+
+def _draw_curves(
+    panel: Axes, name: str, tracks: Sequence[ChainTrack], over: Sequence[ChainTrack]
+) -> None:
+    """Draw a coordinate of all tips; where two are the same, both can be seen."""
+    for track in over:
+        _draw_curve(panel, track, name, linestyle=(0, (4, 2)), alpha=0.6, linewidth=1.5)
+    for track in tracks:
+        _draw_curve(panel, track, name, linewidth=2)
+    for i, track in enumerate(tracks[:-1]):
+        _draw_curve(panel, track, name, linewidth=2, linestyle=(5 * i, (5, 10)))
+
+
+def _draw_curve(panel: Axes, track: ChainTrack, name: str, **style: Any) -> None:
     """Draw a coordinate, or where samples are closer than can be seen the band they fill."""
-    values = track.poses[:, column]
-    if len(values) > _MOST_SAMPLES:
-        _draw_band(panel, track, values)
+    column = COORDINATES.index(name)
+    factor = math.degrees(1.0) if name in _ORIENTATION else 1.0
+    lowest = factor * track.lowest[:, column]
+    highest = factor * track.highest[:, column]
+    color = color_of(track.chain)
+    if len(lowest) > _MOST_SAMPLES:
+        _draw_band(
+            panel, track, lowest, highest, {**style, 'color': color, 'linewidth': 1}
+        )
         return
-    breaks = _breaks(track.times)
     is_hardly_a_line = len(np.unique(track.times)) < 3
     panel.plot(
-        np.insert(track.times, breaks, np.nan),
-        np.insert(values, breaks, np.nan),
-        color=color_of(track.chain),
-        label=_label(track),
-        linewidth=2,
+        np.insert(track.times, track.breaks, np.nan),
+        np.insert(lowest, track.breaks, np.nan),
+        color=color,
         marker='o' if is_hardly_a_line else '',
+        **style,
     )
 
 
-def _draw_band(panel: Axes, track: ChainTrack, values: Array) -> None:
+def _draw_band(
+    panel: Axes, track: ChainTrack, lowest: Array, highest: Array, style: dict[str, Any]
+) -> None:
     """Draw what lies between the lowest and the highest of neighbouring (N,) values."""
-    color = color_of(track.chain)
-    breaks = _breaks(track.times)
-    columns = np.linspace(0, len(values), _COLUMNS).astype(int)
-    edges = np.unique(np.concatenate([columns, breaks]))
+    columns = np.linspace(0, len(lowest), _COLUMNS).astype(int)
+    edges = np.unique(np.concatenate([columns, track.breaks]))
     starts = edges[:-1]
-    holes = np.searchsorted(edges, breaks)
-    middle = np.add.reduceat(track.times, starts) / np.diff(edges)
-    middle = np.insert(middle, holes, np.nan)
-    lowest = np.insert(np.minimum.reduceat(values, starts), holes, np.nan)
-    highest = np.insert(np.maximum.reduceat(values, starts), holes, np.nan)
-    panel.fill_between(middle, lowest, highest, color=color, alpha=0.3, linewidth=0)
-    panel.plot(middle, lowest, color=color, linewidth=1)
-    panel.plot(middle, highest, color=color, linewidth=1, label=_label(track))
+    holes = np.searchsorted(edges, track.breaks)
+    times = np.add.reduceat(track.times, starts) / np.diff(edges)
+    times = np.insert(times, holes, np.nan)
+    lowest = np.insert(np.minimum.reduceat(lowest, starts), holes, np.nan)
+    highest = np.insert(np.maximum.reduceat(highest, starts), holes, np.nan)
+    panel.plot(times, lowest, **style)
+    panel.plot(times, highest, **style)
+    if 'linestyle' not in style:
+        panel.fill_between(
+            times, lowest, highest, color=style['color'], alpha=0.3, linewidth=0
+        )
 
 
-def _label(track: ChainTrack) -> str:
-    return track.chain.tip.replace('_', ' ')
+def _heading(name: str, chain: Chain) -> str:
+    """Return what stands above a panel: what is drawn, and which way its axis points."""
+    axis = 'xyz'.find(name) if name in _POSITION else _ORIENTATION.index(name)
+    direction = f' ({chain.root_axes[axis]})' if chain.root_axes else ''
+    if name in _POSITION:
+        return f'{name}{direction} in {_short(chain.root_frame)} [m]'
+    return f'{name} about {"xyz"[axis]}{direction} from q = 0 [°]'
 
 
 def _draw_outside_ranges(panel: Axes, rows: Sequence[OutOfRange]) -> None:
-    """Draw a row of bars, with its name above it, per joint and end of its range."""
+    """Draw a row per joint and end of its range: its name, and bars below."""
     start, end = panel.get_xlim()
     least = (end - start) / 300  # what can be seen
     for row, outside in enumerate(rows):
         bars = [(begin, max(finish - begin, least)) for begin, finish in outside.spans]
         panel.broken_barh(
-            bars, (row + 0.55, 0.3), color=color_of(outside.chain), linewidth=0
+            bars, (row + 0.6, 0.3), color=color_of(outside.chain), linewidth=0
         )
         panel.text(
             0.005,
-            row + 0.5,
-            outside.text,
+            row + 0.54,
+            range_end(outside),
             fontsize=10,
+            va='bottom',
             transform=panel.get_yaxis_transform(),
         )
     panel.set_yticks([])
-    panel.set_ylim(len(rows) + 0.1, -0.2)
+    panel.set_ylim(len(rows), 0)
     panel.set_title('outside its range', loc='left')
 
 
+def range_end(outside: OutOfRange) -> str:
+    """Return which end of which joint's range is passed: `l_knee > 4°`."""
+    chain = outside.chain
+    link = chain.joints[outside.joint]
+    limit = link.limits[outside.is_above]
+    value = f'{limit:g} m' if link.is_prismatic else f'{math.degrees(limit):g}°'
+    sign = '>' if outside.is_above else '<'
+    return (
+        f'{_short(chain.joint_names[outside.joint])} {sign} {value.replace("-", MINUS)}'
+    )
+
+
 def _mark_instants(panels: Sequence[Axes], instants: Sequence[float]) -> None:
-    """Draw a line at each instant, and its letter above the first panel."""
+    """Draw a line at each instant, and its letter above the first panel, clear of the others."""
     start, end = panels[0].get_xlim()
     for panel in panels:
         for instant in instants:
             panel.axvline(instant, color=INK, linewidth=1, linestyle=(0, (1, 2)))
-    right_of_last = start
-    for letter, instant in zip(LETTERS, instants):
-        at = max(
-            instant, right_of_last
-        )  # so that letters of near instants stand side by side
-        right_of_last = at + 0.03 * (end - start)
+    gap = 0.035 * (end - start)
+    places: list[float] = []
+    for instant in instants:
+        places.append(max(instant, places[-1] + gap) if places else instant)
+    last = end
+    for i in reversed(range(len(places))):
+        places[i] = min(places[i], last)
+        last = places[i] - gap
+    for letter, place in zip(LETTERS, places):
         panels[0].text(
-            at,
-            0.99,
+            place,
+            1.02,
             letter,
             ha='center',
-            va='top',
+            va='bottom',
             weight='bold',
             fontsize=11,
             transform=panels[0].get_xaxis_transform(),
-            bbox={'facecolor': 'white', 'linewidth': 0, 'pad': 0.5},
         )
 
 
 def _draw_scenes(
-    figure: Figure, tracks: Sequence[ChainTrack], instants: Sequence[float]
-) -> Space:
-    """Draw the chains in space at each instant; return the last view."""
-    height = figure.get_figheight()
+    figure: Figure,
+    box: Box,
+    tracks: Sequence[ChainTrack],
+    over: Sequence[ChainTrack],
+    instants: Sequence[float],
+) -> float:
+    """Draw the chains in space at each instant; return the side of the floor's squares [m]."""
     columns = min(2, len(instants))
     rows = math.ceil(len(instants) / 2)
-    places = figure.add_gridspec(
-        rows,
-        columns,
-        left=0.53,
-        right=0.995,
-        top=1 - 0.95 / height,
-        bottom=0.01,
-        wspace=0.0,
-        hspace=0.0,
-    )
+    width = box.width / columns
+    height = box.height / rows
     points = []
     for instant in instants:
-        for track in tracks:
-            q = track.positions[track.nearest(instant)]
-            points.append(track.chain.frames(q)[:, :3, 3])
+        for track in (*tracks, *over):
+            points.append(
+                track.chain.frames(track.positions[track.nearest(instant)])[:, :3, 3]
+            )
     everywhere = np.vstack(points)
-    for i, (letter, instant) in enumerate(zip(LETTERS, instants)):
-        space = Space(figure, places[i], everywhere)
-        _draw_scene(space, tracks, instant)
-        space.axes.text2D(
-            0.06,
-            0.95,
-            f'{letter}  {instant:.2f} s',
+    for i, instant in enumerate(instants):
+        left = box.left + width * (i % columns)
+        bottom = box.bottom + height * (rows - 1 - i // columns)
+        space = Space(figure, Box(left, bottom, width, height - _HEADING), everywhere)
+        _draw_scene(space, tracks, over, instant)
+        words = f'{LETTERS[i]}  {instant:.2f} s'
+        figure.text(
+            (left + 0.2) / figure.get_figwidth(),
+            (bottom + height - _HEADING / 2) / figure.get_figheight(),
+            words,
             weight='bold',
-            transform=space.axes.transAxes,
+            va='center',
         )
-    return space
+    return space.step
 
 
-def _draw_scene(space: Space, tracks: Sequence[ChainTrack], instant: float) -> None:
-    """Draw the root's axes, and the chains with their tips' paths, the nearest last."""
-    space.frame(np.eye(4), 1.2 * space.step, 90)
-    samples = [(track, track.nearest(instant)) for track in tracks]
+def _draw_scene(
+    space: Space,
+    tracks: Sequence[ChainTrack],
+    over: Sequence[ChainTrack],
+    instant: float,
+) -> None:
+    """Draw the root's axes and the chains that have a pose, the nearest last."""
+    space.root()
+    for track in over:
+        if track.covers(instant):
+            space.chain(
+                track.chain, track.positions[track.nearest(instant)], 5, alpha=0.3
+            )
+    there = [
+        (track, track.nearest(instant)) for track in tracks if track.covers(instant)
+    ]
 
     def depth(sample: tuple[ChainTrack, int]) -> float:
         track, i = sample
         return space.depth(track.chain.frames(track.positions[i])[:, :3, 3])
 
-    for rank, (track, i) in enumerate(sorted(samples, key=depth)):
+    for rank, (track, i) in enumerate(sorted(there, key=depth)):
         zorder = 10.0 * (rank + 1)
         q = track.positions[i]
-        around = np.abs(track.times - track.times[i]) <= _TRAIL
         space.line(
-            track.poses[around, :3],
+            track.path_around(i, _TRAIL),
             color=color_of(track.chain),
             linewidth=1,
             alpha=0.5,
@@ -589,40 +474,98 @@ def _draw_scene(space: Space, tracks: Sequence[ChainTrack], instant: float) -> N
         space.frame(track.chain.forward(q), space.step, zorder + 5, 1.8, size=8)
 
 
+def _draw_legend(
+    figure: Figure,
+    layout: _Layout,
+    tracks: Sequence[ChainTrack],
+    over: Sequence[ChainTrack],
+    over_name: str,
+) -> None:
+    """Draw what the lines are, in a row that is as wide as the figure at most."""
+    Line2D = import_matplotlib().lines.Line2D
+    lines = {
+        _label(track): Line2D([], [], color=color_of(track.chain), linewidth=2)
+        for track in tracks
+    }
+    for track in over:
+        lines[f'{_label(track)}, {over_name}'] = Line2D(
+            [],
+            [],
+            color=color_of(track.chain),
+            linewidth=1.5,
+            linestyle=(0, (4, 2)),
+            alpha=0.6,
+        )
+    lines[f'path of a tip, {_TRAIL:g} s before and after'] = Line2D(
+        [], [], color=FAINT, linewidth=1, alpha=0.5
+    )
+    legend = figure.legend(
+        lines.values(),
+        lines.keys(),
+        ncols=len(lines),
+        loc='center left',
+        fontsize=11,
+        borderpad=0,
+        borderaxespad=0,
+        handlelength=1.4,
+        columnspacing=1.6,
+        bbox_to_anchor=(_LEFT / layout.width, 1 - _LEGEND / layout.height),
+    )
+    _fit(figure, legend.get_texts(), layout.width - _LEFT - _MARGIN - 0.6 * len(lines))
+
+
+def _draw_words(
+    figure: Figure, layout: _Layout, title: str, notes: str, notes_on_space: str
+) -> None:
+    """Write what stands above the panels and the scenes."""
+
+    def write(left: float, top: float, words: str, room: float, **style: Any) -> None:
+        text = figure.text(
+            left / layout.width, 1 - top / layout.height, words, va='center', **style
+        )
+        _fit(figure, [text], room)
+
+    beside = layout.scenes.left
+    write(0.4, _TITLE, title, layout.width - 0.4 - _MARGIN, fontsize=19, weight='bold')
+    write(0.4, _NOTES, notes, beside - 0.6, fontsize=10.5, color=FAINT)
+    write(
+        beside + 0.2, _NOTES, notes_on_space, _SCENES - 0.2, fontsize=10.5, color=FAINT
+    )
+
+
+def _fit(figure: Figure, texts: Sequence[Text], room: float) -> None:
+    """Make texts beside each other so small that they need no more than some inches in all."""
+    renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
+    width = sum(text.get_window_extent(renderer).width for text in texts) / figure.dpi
+    if width > room:
+        for text in texts:
+            text.set_fontsize(float(text.get_fontsize()) * room / width)
+
+
 def _notes(tracks: Sequence[ChainTrack], any_outside: bool) -> str:
     """Return what explains the curves."""
     notes = []
     if not any_outside:
         notes.append('all joints inside their ranges')
-    found = gaps(tracks)
-    if found:
-        longest = max(end - begin for begin, end in found)
-        notes.append(f'grey: no pose, {longest:.2f} s at most')
+    gaps = [end - begin for track in tracks for begin, end in track.gaps]
+    if gaps:
+        notes.append(f'grey: no pose, {max(gaps):.2f} s at most')
     if any(len(track.times) > _MOST_SAMPLES for track in tracks):
         notes.append('bands: lowest to highest')
     return ';  '.join(notes)
 
 
-def _spans(times: Array, mask: NDArray[np.bool_]) -> list[tuple[float, float]]:
-    """Return from when to when [s] an (N,) mask holds, up to the sample after."""
-    ends = np.flatnonzero(np.diff([False, *mask, False]))
-    ends = np.minimum(ends, len(times) - 1)
-    return [(begin, end) for begin, end in times[ends].reshape(-1, 2).tolist()]
+def _notes_on_space(tracks: Sequence[ChainTrack], step: float) -> str:
+    """Return what explains the scenes."""
+    frames = [tracks[0].chain.root_frame, *(track.chain.frame_id for track in tracks)]
+    named = ', '.join(_short(frame) for frame in dict.fromkeys(frames))
+    return f'axes x, y, z of {named};  squares of {step:g} m'
 
 
-def _breaks(times: Array) -> NDArray[np.intp]:
-    """Return the indices of the samples that do not go on from the one before."""
-    steps = np.diff(times)
-    forward = steps[steps > 0]
-    usual = np.median(forward) if len(forward) > 1 else np.inf
-    return np.flatnonzero((steps > _GAP * usual) | (steps < 0)) + 1
+def _label(track: ChainTrack) -> str:
+    return _short(track.chain.tip.replace('_', ' '))
 
 
-def _round_step(least: float) -> float:
-    """Return the smallest of 0.1, 0.2, 0.5, 1 and the like [m] that is not below a length."""
-    least = max(least, 1e-4)
-    decade = 10.0 ** math.floor(math.log10(least))
-    for factor in (1, 2, 5):
-        if factor * decade >= least:
-            return factor * decade
-    return 10 * decade
+def _short(name: str) -> str:
+    """Return a name, cut off if it is very long."""
+    return name if len(name) <= _LONGEST_NAME else f'{name[:_LONGEST_NAME]}...'

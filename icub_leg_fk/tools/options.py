@@ -1,7 +1,7 @@
 """What subcommands share: options by their names, and the chains and joint positions they mean."""
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 import math
 import sys
 from typing import Any
@@ -111,7 +111,30 @@ def chains_of_one_root(args: argparse.Namespace) -> list[Chain]:
         )
     if not args.foot_frame:
         return list(chains)
-    return [chain.with_frame(args.foot_frame) for chain in chains]
+    return _in_frame(chains, args.foot_frame)
+
+
+def print_notes(warnings: Iterable[str], notes: Iterable[str]) -> None:
+    """Print what a user should know of an input, each in a line on stderr."""
+    for warning in warnings:
+        print(f'leg_fk: warning: {warning}', file=sys.stderr)
+    for note in notes:
+        print(f'leg_fk: note: {note}', file=sys.stderr)
+
+
+def _in_frame(chains: Sequence[Chain], frame: str) -> list[Chain]:
+    """Return chains in a frame that at least one of them has, with a line on those without it."""
+    if not any(frame in chain.tip_frames for chain in chains):
+        return [chain.with_frame(frame) for chain in chains]  # which says what there is
+    framed = []
+    for chain in chains:
+        if frame in chain.tip_frames:
+            framed.append(chain.with_frame(frame))
+        else:
+            framed.append(chain)
+            note = f'{chain.name} has no {frame} frame; its pose is that of {chain.frame_id}'
+            print_notes([], [note])
+    return framed
 
 
 def joint_positions(args: argparse.Namespace, chain: Chain) -> list[float] | None:
@@ -234,8 +257,17 @@ _OPTIONS: dict[str, dict[str, Any]] = {
     },
     '--joint-topic': {
         'metavar': 'TOPIC',
-        'help': "the bag's topic of joint states (default: /joint_states, or the only one there "
+        'nargs': '+',
+        'dest': 'joint_topics',
+        'default': (),
+        'help': "the bag's topics of joint states (default: /joint_states, or the only one there "
         'is)',
+    },
+    '--time-unit': {
+        'metavar': '{s,ms,us,ns}',
+        'choices': ('s', 'ms', 'us', 'ns'),
+        'default': '',
+        'help': 'unit of the times in a CSV file (default: told by their size and the header)',
     },
     '--json': {'action': 'store_true', 'help': 'print JSON, for programs'},
     '--kinematics-file': {

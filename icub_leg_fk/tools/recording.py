@@ -1,45 +1,227 @@
-"""Joint recordings: what joints and chains did over time, from a bag or a CSV file."""
+"""Joint recordings of every kind as one stream of messages: bags, CSV files, logs of YARP.
+
+Several of them are parts of one robot, and so are several topics of a bag.
+"""
 
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-import csv
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from contextlib import contextmanager, ExitStack
 from dataclasses import dataclass
-from functools import cached_property
-import math
+import heapq
+from operator import itemgetter
 from pathlib import Path
-import struct
-import sys
-from typing import Any, NamedTuple
 
 from icub_leg_fk.errors import InputFileError, LegFKError
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.stream.configuration import DEFAULT_TIMEOUT
-from icub_leg_fk.stream.joint_input import JointInput, Look
-from icub_leg_fk.stream.notes import Note, notes_of
+from icub_leg_fk.stream.joint_input import JointInput, Look, Ready
+from icub_leg_fk.stream.notes import notes_of
+from icub_leg_fk.tools import csv_file
 from icub_leg_fk.tools.bags import (
+    Bag,
     DEFAULT_TOPIC,
     import_rosbags,
     JOINT_STATE,
+    METADATA,
     new_bag,
     open_bag,
+    STORAGES,
 )
-from icub_leg_fk.tools.options import LARGEST, number
+from icub_leg_fk.tools.csv_file import CsvFile
+from icub_leg_fk.tools.joint_states import Messages, Part, SECOND
 from icub_leg_fk.tools.progress import Progress
+from icub_leg_fk.tools.yarp_log import DATA, is_yarp_log, PARTS, YarpLog
 import numpy as np
-from numpy.typing import NDArray
 
-TIMES = ('time', 'Time', 'timestamp')
-EPOCH = 1e8  # s; times beyond it count from 1970 and not from the start
+KINDS = (
+    'a bag (directory, .mcap or .db3), a CSV file (.csv, .tsv or .txt) or a directory of '
+    'yarpdatadumper'
+)
 
-_NANOSECONDS = 1_000_000_000  # in a second
-_ENCAPSULATION = b'\x00\x01\x00\x00'  # CDR, little-endian
+_OF_ROS_1 = '.bag'
+_COMPRESSED = '.zstd'
 
-Messages = Iterable[
-    tuple[int, bytes]
-]  # time of recording [ns] and CDR bytes of a JointState
+
+class BagTopics(Part):
+    """The joint states of a bag on some topics, as a part of a recording.
+
+    Args:
+        bag: the bag.
+        topics: the topics; `/joint_states`, or the only one there is, if none is named.
+        joints: the joints that are looked for.
+
+    Raises:
+        InputFileError: there are no joint states on a topic; lists the topics that have some.
+    """
+
+    def __init__(self, bag: Bag, topics: Sequence[str], joints: Sequence[str]) -> None:
+        super().__init__(bag.path)
+        self.notes = bag.notes
+        self._bag = bag
+        self._connections = bag.joint_connections(topics, joints)
+        self._topics = list(dict.fromkeys(each.topic for each in self._connections))
+        self.topic = ' and '.join(self._topics)
+        self.joint_names = bag.joint_names(self._topics)
+
+    def messages(self, progress: Progress | None = None) -> Messages:
+        """Yield time of recording [ns] and CDR bytes of each JointState."""
+        for _, time, data in self._bag.messages(self._connections, progress):
+            yield time, data
+
+    def span(self) -> tuple[int, int]:
+        """Return the first and the last time of recording [ns]."""
+        return self._bag.span
+
+    def topics_with(self, joints: Collection[str]) -> list[str]:
+        """Return the other topics of the bag that have some joints."""
+        others = [name for name in self._bag.joint_topics() if name not in self._topics]
+        return [
+            name for name in others if set(joints) & set(self._bag.joint_names([name]))
+        ]
+
+
+class Recording:
+    """What joints did, in one part or several.
+
+    Attributes:
+        name: its paths.
+        topic: topics of the joint states; empty if it has no topics.
+        start: time that is called 0 [ns]; None if that is the first pose.
+        notes: what a user should know of it, one line each.
+    """
+
+    def __init__(self, parts: Sequence[Part]) -> None:
+        self._parts = parts
+        self.name = ', '.join(str(part.path) for part in parts)
+        self.topic = ' and '.join(part.topic for part in parts if part.topic)
+        self.start = 0 if all(part.is_relative for part in parts) else None
+        self.notes = [note for part in parts for note in part.notes]
+        if len(parts) > 1:
+            _refuse_shared_joints(parts)
+            _refuse_separate_spans(parts)
+
+    def messages(self, progress: Progress | None = None) -> Messages:
+        """Yield time of recording [ns] and CDR bytes of each JointState, those of parts by time.
+
+        Raises:
+            InputFileError: a part cannot be read to its end.
+        """
+        if len(self._parts) == 1:
+            return self._parts[0].messages(progress)
+        shares = [0.0] * len(self._parts)
+        streams = []
+        for place, part in enumerate(self._parts):
+            streams.append(part.messages(_share_of(place, shares, progress)))
+        return heapq.merge(*streams, key=itemgetter(0))
+
+    def span(self) -> tuple[int, int]:
+        """Return the first and the last time [ns]."""
+        spans = [part.span() for part in self._parts]
+        return min(first for first, _ in spans), max(last for _, last in spans)
+
+    def advice(self, joints: Collection[str]) -> str:
+        """Return on which other topics joints are; nothing if on none."""
+        topics = [topic for part in self._parts for topic in part.topics_with(joints)]
+        return f'; --joint-topic can be {" or ".join(topics)}' if topics else ''
+
+
+@contextmanager
+def open_recording(
+    paths: Sequence[str | Path],
+    chains: Sequence[Chain],
+    topics: Sequence[str] = (),
+    time_unit: str = '',
+) -> Iterator[Recording]:
+    """Give a recording for reading.
+
+    Args:
+        paths: where its parts are: bags, CSV files, directories of yarpdatadumper or with some.
+        chains: the chains whose joints are looked for.
+        topics: topics of joint states in bags; `/joint_states`, or the only one there is, if none
+            is named.
+        time_unit: unit of the times in CSV files; if empty it is told by their size, or by the
+            header.
+
+    Raises:
+        InputFileError: a part cannot be read, or does not go with another.
+        LegFKError: topics are named, and no part is a bag.
+    """
+    joints = list(dict.fromkeys(name for chain in chains for name in chain.joint_names))
+    with ExitStack() as stack:
+        parts: list[Part] = []
+        for path in map(Path, paths):
+            without_topics = parts_without_topics(path, chains, time_unit)
+            if without_topics:
+                parts += without_topics
+            else:
+                bag = stack.enter_context(open_bag(path))
+                parts.append(BagTopics(bag, topics, joints))
+        if topics and not any(part.topic for part in parts):
+            raise LegFKError(f'--joint-topic: {parts[0].path} has no topics')
+        yield Recording(parts)
+
+
+def follow(
+    recording: Recording,
+    chains: Sequence[Chain],
+    take: Callable[[list[Ready]], None],
+    *,
+    joint_timeout: float = DEFAULT_TIMEOUT,
+    velocities: bool = False,
+    progress: Progress | None = None,
+) -> Look:
+    """Read a recording by the node's own input rules; return what there is to see of it.
+
+    Args:
+        recording: the recording.
+        chains: the chains.
+        take: takes what each message makes ready.
+        joint_timeout: how far a joint may lag the newest of its chain [s]; 0 is any time.
+        velocities: whether velocities are wanted.
+        progress: called now and then with the share that is done, 0 to 1.
+    """
+    now = 0
+    joint_input = JointInput(lambda: now)
+    joint_input.configure(chains, joint_timeout, velocities)
+    for now, data in recording.messages(progress):  # noqa: B007 (a message without stamp has it)
+        ready = joint_input.feed(data)
+        if ready:
+            take(ready)
+    return joint_input.take_look()
+
+
+def warnings_of(
+    recording: Recording, look: Look, poseless: Collection[str]
+) -> list[str]:
+    """Return what there is to say of the joint states, and why chains have no pose.
+
+    Args:
+        recording: the recording, still open.
+        look: what there is to see of it.
+        poseless: names of the chains that have no pose.
+
+    Raises:
+        InputFileError: no chain has a pose; says why.
+    """
+    notes = notes_of(look, recording.topic)
+    others = ' '.join(name for name in look.chains if name not in poseless)
+    lines = []
+    for note in notes:
+        line = str(note)
+        if note.chain in poseless:
+            chain = look.chains[note.chain].chain
+            line += recording.advice(chain.joint_names)
+            if others:
+                line = line.replace(':', ' has no pose:', 1)
+                line += f'; --chains {others} leaves it out'
+        lines.append(line)
+    if not others:
+        faults = '; '.join(lines) or 'no message of joint states'
+        raise InputFileError(recording.name, f'no chain has a pose: {faults}')
+    return lines
 
 
 @dataclass(frozen=True)
@@ -48,7 +230,7 @@ class JointRecording:
 
     Attributes:
         joint_names: n names.
-        times: (N,) times [s], not decreasing.
+        times: (N,) times [s].
         positions: (N, n) joint positions [rad or m].
     """
 
@@ -61,290 +243,46 @@ class JointRecording:
         n = int(np.searchsorted(self.times, self.times[0] + seconds, side='right'))
         return JointRecording(self.joint_names, self.times[:n], self.positions[:n])
 
-    def track(self, chain: Chain) -> ChainTrack:
-        """Return what one chain did; its joints must be in the recording."""
-        columns = [self.joint_names.index(name) for name in chain.joint_names]
-        return ChainTrack(chain, self.times, self.positions[:, columns])
+    def positions_of(self, chain: Chain) -> Array:
+        """Return the (N, n) joint positions of a chain [rad or m]."""
+        return self.positions[
+            :, [self.joint_names.index(name) for name in chain.joint_names]
+        ]
 
 
-@dataclass(frozen=True)
-class ChainTrack:
-    """What one chain did over time.
+def read_joints(paths: Sequence[str | Path], chains: Sequence[Chain]) -> JointRecording:
+    """Return the joint positions of chains at the times at which all of them have a pose.
 
-    Attributes:
-        chain: the chain.
-        times: (N,) times [s].
-        positions: (N, n) joint positions [rad or m].
-        received: (N, 7) poses as a node sent them; None to compute them.
-    """
-
-    chain: Chain
-    times: Array
-    positions: Array
-    received: Array | None = None
-
-    @cached_property
-    def poses(self) -> Array:
-        """(N, 7) rows x, y, z [m], qx, qy, qz, qw of the tip in the root frame."""
-        return (
-            self.chain.poses(self.positions) if self.received is None else self.received
-        )
-
-    def nearest(self, time: float) -> int:
-        """Return the index of the sample nearest to a time [s]."""
-        return int(np.abs(self.times - time).argmin())
-
-    def where(self, mask: NDArray[np.bool_]) -> ChainTrack:
-        """Return the samples that an (N,) mask chooses."""
-        received = None if self.received is None else self.received[mask]
-        return ChainTrack(self.chain, self.times[mask], self.positions[mask], received)
-
-
-class Reading(NamedTuple):
-    """What chains did in a recording.
-
-    Attributes:
-        tracks: of the chains that have a pose.
-        warnings: what there is to say of the joint states, and why other chains have no pose.
-        notes: what there is to say of the file.
-    """
-
-    tracks: list[ChainTrack]
-    warnings: list[str]
-    notes: list[str]
-
-
-def time_span(tracks: Sequence[ChainTrack]) -> tuple[float, float]:
-    """Return the first and the last time of some tracks [s]."""
-    first = min(float(track.times.min()) for track in tracks)
-    last = max(float(track.times.max()) for track in tracks)
-    return first, last
-
-
-def read_tracks(
-    path: str | Path,
-    chains: Sequence[Chain],
-    topic: str | None = None,
-    progress: Progress | None = None,
-) -> Reading:
-    """Return what some chains did in a bag or a CSV file, by the node's own input rules.
-
-    Args:
-        path: a rosbag2 directory or one of its files, or a CSV file.
-        chains: the chains.
-        topic: topic of the joint states in a bag; `/joint_states`, or the only one there is, if
-            None.
-        progress: called now and then with the share that is done, 0 to 1.
+    Times count from the first of them, unless they count from something else than 1970.
 
     Raises:
-        InputFileError: it cannot be read, or no chain has a pose.
-        LegFKError: a topic is given for a CSV file.
+        InputFileError: it cannot be read, or there is no such time.
     """
-    if Path(path).suffix.lower() != '.csv':
-        with open_bag(path) as bag:
-            connections = bag.joint_connections(topic)
-            messages = (
-                (time, data) for _, time, data in bag.messages(connections, progress)
-            )
-            tracks, look = _follow(messages, chains)
-        return _reading(path, tracks, notes_of(look, connections[0].topic), bag.notes)
-    if topic is not None:
-        raise LegFKError(f'--joint-topic: {path} is a CSV file, which has no topics')
-    joint_names = dict.fromkeys(name for chain in chains for name in chain.joint_names)
-    recording = read_csv(path, joint_names)
-    tracks, look = _follow(joint_states(recording), chains, start=0)
-    return _reading(path, tracks, notes_of(look), [])
+    stamps = array('q')
+    positions = array('d')
+
+    def take(vectors: Sequence[Ready]) -> None:
+        if len(vectors) == len(chains):
+            stamps.append(vectors[0].stamp)
+            for ready in vectors:
+                positions.extend(ready.positions)
+
+    with open_recording(paths, chains) as recording:
+        look = follow(recording, chains, take)
+        warnings_of(recording, look, list(look.chains) if not stamps else [])
+    times = np.frombuffer(stamps, dtype=np.int64)
+    start = times[0] if recording.start is None else recording.start
+    joint_names = [name for chain in chains for name in chain.joint_names]
+    return JointRecording(
+        joint_names=tuple(joint_names),
+        times=(times - start) / SECOND,
+        positions=np.frombuffer(positions).reshape(len(times), -1),
+    )
 
 
-def _follow(
-    messages: Messages, chains: Sequence[Chain], start: int | None = None
-) -> tuple[dict[str, ChainTrack], Look]:
-    """Return what chains do by some messages, by name, and what there is to see of these.
-
-    Times count from `start` [ns], or from the first pose.
-    """
-    now = 0
-    joint_input = JointInput(lambda: now)
-    joint_input.configure(chains, DEFAULT_TIMEOUT)
-    stamps = {chain.name: array('q') for chain in chains}
-    positions = {chain.name: array('d') for chain in chains}
-    for now, data in messages:  # noqa: B007 (which a message without a stamp has instead)
-        for ready in joint_input.feed(data):
-            stamps[ready.chain.name].append(ready.stamp)
-            positions[ready.chain.name].extend(ready.positions)
-    if start is None:
-        start = min(
-            (of_chain[0] for of_chain in stamps.values() if of_chain), default=0
-        )
-    tracks = {}
-    for chain in chains:
-        times = (
-            np.frombuffer(stamps[chain.name], dtype=np.int64) - start
-        ) / _NANOSECONDS
-        q = np.frombuffer(positions[chain.name]).reshape(-1, chain.n)
-        tracks[chain.name] = ChainTrack(chain, times, q)
-    return tracks, joint_input.take_look()
-
-
-def _reading(
-    path: str | Path,
-    tracks: Mapping[str, ChainTrack],
-    warnings: Sequence[Note],
-    notes: Sequence[str],
-) -> Reading:
-    """Return the tracks that have poses, and of the others why they have none."""
-    drawn = [track for track in tracks.values() if len(track.times)]
-    if not drawn:
-        faults = [str(note) for note in warnings] or ['no message of joint states']
-        raise InputFileError(str(path), f'no chain has a pose: {"; ".join(faults)}')
-    lines = []
-    for note in warnings:
-        is_drawn = note.chain == '' or len(tracks[note.chain].times)
-        lines.append(
-            str(note) if is_drawn else f'{note.chain} has no pose: {note.text}'
-        )
-    return Reading(drawn, lines, list(notes))
-
-
-def read_csv(path: str | Path, joint_names: Iterable[str]) -> JointRecording:
-    """Read a CSV file: a header, a column of times [s] and one column per joint [rad].
-
-    Values are separated by commas, semicolons or tabs; the times are under `time`, `Time` or
-    `timestamp`, and those since 1970 are taken from the first one on. Other columns are ignored.
-
-    Raises:
-        InputFileError: it cannot be read, or has a mistake; names its line.
-    """
-    joints = tuple(joint_names)
-    values = array('d')
-    try:
-        with open(path, encoding='utf-8-sig', newline='') as stream:
-            header = stream.readline()
-            stream.seek(0)
-            rows = csv.reader(stream, delimiter=max(',;\t', key=header.count))
-            for row in _Rows(str(path), rows, joints):
-                values.extend(row)
-    except OSError as error:
-        raise InputFileError(str(path), f'cannot be read: {error.strerror}') from error
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise InputFileError(
-            str(path),
-            f'is not CSV text ({error}); allowed: a header and rows of numbers',
-        ) from error
-    table = np.frombuffer(values).reshape(-1, 1 + len(joints))
-    if not len(table):
-        raise InputFileError(
-            str(path), 'no rows; allowed: at least one after the header'
-        )
-    times = table[:, 0]
-    if times[0] > EPOCH:
-        times = times - times[0]
-    return JointRecording(joints, times, table[:, 1:])
-
-
-class _Rows:
-    """The rows of a CSV file as numbers: time [s] and joint positions.
-
-    Args:
-        file: name of the file.
-        rows: a `csv.reader`.
-        joints: the names of the joints.
-    """
-
-    def __init__(self, file: str, rows: Any, joints: Sequence[str]) -> None:
-        self._file = file
-        self._rows = rows
-        header = [name.strip() for name in next(rows, [])]
-        self._width = len(header)
-        self._names = (self._time_column(header, joints), *joints)
-        self._places = [self._place(header, name) for name in self._names]
-
-    def __iter__(self) -> Iterator[list[float]]:
-        before = -math.inf
-        for row in self._rows:
-            if not row:  # an empty line
-                continue
-            numbers = self._numbers(row)
-            if numbers[0] < before:
-                raise self._fault(
-                    f'column {self._names[0]}: {numbers[0]} after {before}',
-                    'times in order',
-                )
-            before = numbers[0]
-            yield numbers
-
-    def _numbers(self, row: Sequence[str]) -> list[float]:
-        if len(row) != self._width:
-            raise self._fault(
-                f'{len(row)} values under {self._width} columns', 'one value per column'
-            )
-        numbers = [number(row[place]) for place in self._places]
-        largest = sys.float_info.max  # of the time, which stands first
-        for name, place, value in zip(self._names, self._places, numbers):
-            if not abs(value) <= largest:
-                raise self._fault(
-                    f'column {name}: {row[place]!r}',
-                    f'a finite number up to {LARGEST:g}',
-                )
-            largest = LARGEST
-        return numbers
-
-    def _time_column(self, header: Sequence[str], joints: Sequence[str]) -> str:
-        if not any(header):
-            raise self._fault('no header', f'time, {", ".join(joints)}')
-        for name in TIMES:
-            if name in header:
-                return name
-        raise self._fault(
-            f'no column of times in the header ({_shown(header)})', ' or '.join(TIMES)
-        )
-
-    def _place(self, header: Sequence[str], name: str) -> int:
-        """Return where a column is."""
-        if header.count(name) != 1:
-            found = 'appears twice' if name in header else 'is missing'
-            raise self._fault(
-                f'column {name} {found} in the header ({_shown(header)})',
-                ', '.join(self._names),
-            )
-        return header.index(name)
-
-    def _fault(self, found: str, allowed: str) -> InputFileError:
-        line = self._rows.line_num or 1
-        return InputFileError(f'{self._file}:{line}', f'{found}; allowed: {allowed}')
-
-
-def _shown(header: Sequence[str]) -> str:
-    """Return the first columns of a header, as far as a message can hold them."""
-    return ', '.join(repr(name)[1:-1][:40] for name in header[:20])
-
-
-def joint_states(recording: JointRecording) -> Iterator[tuple[int, bytes]]:
-    """Yield time [ns] and CDR bytes of a JointState per sample of a recording."""
-    names = recording.joint_names
-    head = _padded(_string(''), 4) + struct.pack('<I', len(names))
-    for name in names:
-        head += _padded(_string(name), 4)
-    head += struct.pack('<I', len(names))
-    head = _padded(head, 8)  # as it stands after a stamp of 8 bytes
-    pack = struct.Struct(f'<4siI{len(head)}s{len(names)}dII').pack
-    for time, q in zip(recording.times.tolist(), recording.positions.tolist()):
-        stamp = round(time * _NANOSECONDS)
-        yield stamp, pack(_ENCAPSULATION, *divmod(stamp, _NANOSECONDS), head, *q, 0, 0)
-
-
-def _string(text: str) -> bytes:
-    """Return a string as CDR has it."""
-    data = text.encode() + b'\0'
-    return struct.pack('<I', len(data)) + data
-
-
-def _padded(data: bytes, size: int) -> bytes:
-    """Return bytes filled up to a multiple of a size."""
-    return data + bytes(-len(data) % size)
-
-
-def write_joint_states(path: str | Path, sent: Messages, *, force: bool) -> None:
+def write_joint_states(
+    path: str | Path, sent: Iterable[tuple[int, bytes]], *, force: bool
+) -> None:
     """Write serialized JointStates, by stamp [ns], as a bag, whole or not at all."""
     typesys = import_rosbags().typesys
     store = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
@@ -352,3 +290,96 @@ def write_joint_states(path: str | Path, sent: Messages, *, force: bool) -> None
         topic = writer.add_connection(DEFAULT_TOPIC, JOINT_STATE, typestore=store)
         for stamp, data in sent:
             writer.write(topic, stamp, data)
+
+
+def parts_without_topics(
+    path: Path, chains: Sequence[Chain], time_unit: str
+) -> list[Part]:
+    """Return the CSV file or the logs of YARP at a path; nothing if there is a bag.
+
+    Raises:
+        InputFileError: there is nothing, or something else, or they cannot be read.
+    """
+    if not path.exists():
+        fault = f'there is no such file or directory; allowed: {KINDS}'
+        raise InputFileError(str(path), fault)
+    if path.is_file() and path.suffix.lower() in csv_file.ENDINGS:
+        return [CsvFile(path, chains, time_unit)]
+    logs = _yarp_logs(path)
+    if not logs:
+        _refuse_other_files(path)
+    return logs
+
+
+def _yarp_logs(path: Path) -> list[Part]:
+    """Return the logs of YARP that a path is, or that stand in it; none if it is something else.
+
+    Those of parts whose joints are not known are left out, with a note.
+    """
+    if path.name == DATA and path.is_file():
+        path = path.parent
+    folders = [path]
+    if path.is_dir() and not is_yarp_log(path) and not (path / METADATA).exists():
+        folders = sorted(path.iterdir())
+    logs = [YarpLog(folder) for folder in folders if is_yarp_log(folder)]
+    known = [log for log in logs if log.joint_names]
+    ports = ', '.join(log.port for log in logs if not log.joint_names)
+    if ports and not known:
+        fault = f'{ports} is of no known part; allowed: {", ".join(PARTS)}'
+        raise InputFileError(str(path), fault)
+    if ports:
+        known[0].notes.append(f'left out: {ports}, of which no joint is known')
+    return list(known)
+
+
+def _refuse_other_files(path: Path) -> None:
+    """Refuse a file that is no recording by its name."""
+    if path.is_dir() or path.suffix in (*STORAGES, _OF_ROS_1, _COMPRESSED):
+        return
+    if path.suffix == '.mat':
+        raise InputFileError(
+            str(path),
+            'is a file of MATLAB, as robometry writes it; save it as a CSV file with a column '
+            'time and one per joint, in radians',
+        )
+    raise InputFileError(str(path), f'is no recording by its name; allowed: {KINDS}')
+
+
+def _refuse_shared_joints(parts: Sequence[Part]) -> None:
+    """Refuse parts that bring the same joint."""
+    owner: dict[str, Part] = {}
+    for part in parts:
+        for joint in part.joint_names:
+            other = owner.setdefault(joint, part)
+            if other is not part:
+                raise InputFileError(
+                    str(part.path),
+                    f'brings joint {joint}, and so does {other.path}; allowed: each joint once',
+                )
+
+
+def _refuse_separate_spans(parts: Sequence[Part]) -> None:
+    """Refuse parts that were not recorded at the same time."""
+    spans = [(part.span(), part) for part in parts]
+    (start, _), latest = max(spans, key=lambda each: each[0][0])
+    (_, end), earliest = min(spans, key=lambda each: each[0][1])
+    if start > end:
+        raise InputFileError(
+            str(latest.path),
+            f'begins at {start / SECOND:.3f} s, and {earliest.path} ends at {end / SECOND:.3f} s; '
+            'allowed: parts of one time',
+        )
+
+
+def _share_of(
+    place: int, shares: list[float], progress: Progress | None
+) -> Progress | None:
+    """Return what takes the share of one part that is done, and tells that of all."""
+    if progress is None:
+        return None
+
+    def show(share: float) -> None:
+        shares[place] = share
+        progress(sum(shares) / len(shares))
+
+    return show

@@ -16,7 +16,7 @@ import re
 from icub_leg_fk.kinematics.chain_text import short
 from icub_leg_fk.kinematics.rotation import Array, turns_about
 from icub_leg_fk.tools import text
-from icub_leg_fk.tools.drawing import AXIS_COLORS
+from icub_leg_fk.tools.space import AXIS_COLORS
 from icub_leg_fk.tools.viewer_scene import (
     arrows,
     axes,

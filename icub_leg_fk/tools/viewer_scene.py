@@ -9,7 +9,7 @@ import math
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.stream.colors import color_of
-from icub_leg_fk.tools.drawing import AXIS_COLORS
+from icub_leg_fk.tools.space import AXIS_COLORS
 import numpy as np
 
 INK = '#222222'

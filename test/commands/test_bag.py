@@ -32,7 +32,7 @@ from support.bag_files import (
     write_bag,
     write_topics,
 )
-from support.leg_fk_process import assert_one_line_complaint, run_main
+from support.leg_fk_process import assert_one_line_complaint, leg_fk, run_main
 from support.recorded_walk import SHARED
 import yaml
 
@@ -55,7 +55,7 @@ def recorded(request, tmp_path_factory):
 
 
 def information_of(bag):
-    text = (bag / 'metadata.yaml').read_text()
+    text = (bag / 'metadata.yaml').read_text(encoding='utf-8')
     return yaml.safe_load(text)['rosbag2_bagfile_information']
 
 
@@ -64,7 +64,7 @@ def edit(bag, old, new):
     file = bag / 'metadata.yaml'
     text = file.read_text()
     assert old in text
-    file.write_text(text.replace(old, new))
+    file.write_text(text.replace(old, new), encoding='utf-8')
 
 
 def assert_pose(message, matrix):
@@ -410,7 +410,7 @@ def test_poses_that_are_there_already_are_not_mixed_with_new_ones(tmp_path, reco
     )
 
 
-def test_another_joint_topic(tmp_path):
+def test_another_joint_topic_and_its_namespace(tmp_path):
     write_bag(tmp_path / 'in', joints=walk(10), topic='/robot/joints')
     assert_one_line_complaint(
         run_main(
@@ -418,7 +418,25 @@ def test_another_joint_topic(tmp_path):
         ),
         'no joint states on /joint_states; --joint-topic can be /robot/joints',
     )
-    assert add_foot_poses(tmp_path / 'in', tmp_path / 'out').added[LEFT_POSE] == 10
+    added = add_foot_poses(tmp_path / 'in', tmp_path / 'out').added
+    assert added == {f'/robot{LEFT_POSE}': 10, f'/robot{RIGHT_POSE}': 10}
+    added = add_foot_poses(tmp_path / 'in', tmp_path / 'root', namespace='').added
+    assert added == {LEFT_POSE: 10, RIGHT_POSE: 10}
+
+
+def test_two_robots_fit_into_one_bag(tmp_path):
+    topics = {f'/icub{i}/joint_states': (JOINT_STATE, [], walk(10)) for i in (1, 2)}
+    write_topics(tmp_path / 'in', topics)
+    add_foot_poses(
+        tmp_path / 'in', tmp_path / 'one', joint_topics=['/icub1/joint_states']
+    )
+    added = add_foot_poses(
+        tmp_path / 'one', tmp_path / 'two', joint_topics=['/icub2/joint_states']
+    ).added
+    assert added == {f'/icub2{LEFT_POSE}': 10, f'/icub2{RIGHT_POSE}': 10}
+    _, messages = read_bag(tmp_path / 'two')
+    for name in ('/icub1', '/icub2'):
+        assert_poses(messages, f'{name}{LEFT_POSE}', expected_poses(walk(10)))
 
 
 def test_a_zero_stamp_becomes_the_time_of_recording(tmp_path):
@@ -696,6 +714,26 @@ def test_odd_values_in_metadata_are_refused(tmp_path, old, new):
     source = write_bag(tmp_path / 'in', joints=walk(5))
     edit(source, old, new)
     refused(tmp_path, source, 'metadata.yaml has values of the wrong type')
+
+
+def test_metadata_of_a_newer_version_is_called_so(tmp_path):
+    source = write_bag(tmp_path / 'in', joints=walk(5))
+    edit(source, 'version: 9', 'version: 10')
+    refused(
+        tmp_path,
+        source,
+        'version 10 not supported; please report issue; a newer rosbags',
+    )
+    assert add_foot_poses(source / 'in.mcap', tmp_path / 'out').joint_states == 5
+
+
+def test_metadata_is_read_in_any_locale(tmp_path):
+    source = write_bag(tmp_path / 'in', joints=walk(5))
+    edit(source, 'custom_data:', 'custom_data: {robot: caf\u00e9} #')
+    locale = {'LC_ALL': 'C', 'PYTHONUTF8': '0', 'PYTHONCOERCECLOCALE': '0'}
+    done = leg_fk('bag', source, tmp_path / 'out', environment=locale)
+    assert (done.returncode, done.stderr) == (0, '')
+    assert information_of(tmp_path / 'out')['custom_data'] == {'robot': 'caf\u00e9'}
 
 
 def test_a_directory_without_a_recording_is_refused(tmp_path):

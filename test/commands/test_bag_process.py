@@ -172,7 +172,7 @@ def test_the_input_is_never_the_output(tmp_path, source):
         (['in', 'a', 'b'], '3 bags without --out-dir; allowed: two'),
         (
             ['notes.txt', 'out'],
-            "format '.txt'; allowed: a rosbag2 directory, or a .mcap or .db3",
+            'notes.txt:1: no column of times in the header (notes)',
         ),
         (['loop', 'out'], 'loop: there is no such file'),
         (['in', '-'], '-: is standard output'),

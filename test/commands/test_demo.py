@@ -17,7 +17,7 @@ from icub_leg_fk.commands.demo import conclude
 from icub_leg_fk.kinematics import config_file
 from icub_leg_fk.stream.configuration import LEGS
 from icub_leg_fk.tools import replay as replays
-from icub_leg_fk.tools.recording import read_csv
+from icub_leg_fk.tools.recording import read_joints
 from icub_leg_fk.tools.terminal import import_rich
 import numpy as np
 import pytest
@@ -28,7 +28,8 @@ pytest.importorskip('rclpy', reason='needs ROS 2')
 
 DEMO = (sys.executable, '-m', 'icub_leg_fk', 'demo')
 TIPS = ('left_foot', 'right_foot')
-JOINTS = [name for chain in Catalog.load().select(LEGS) for name in chain.joint_names]
+CHAINS = Catalog.load().select(LEGS)
+JOINTS = [name for chain in CHAINS for name in chain.joint_names]
 
 
 @pytest.fixture(autouse=True)
@@ -41,7 +42,9 @@ def own_directory(tmp_path, monkeypatch):
 
 
 def walk(seconds):
-    return read_csv(config_file('examples/synthetic_walk.csv'), JOINTS).first(seconds)
+    return read_joints([config_file('examples/synthetic_walk.csv')], CHAINS).first(
+        seconds
+    )
 
 
 def start(*words):
@@ -261,12 +264,12 @@ def test_on_a_terminal_the_table_is_redrawn_in_place():
         ('--save bad.csv', ['bad.csv', 'exists']),
         ('--save kept.mcap', ['kept.mcap', '--force']),
         ('--recording no.csv', ['no.csv']),
-        ('--recording bad.csv', ['bad.csv:3', 'column r_knee', "'nan'"]),
+        ('--recording bad.csv', ['bad.csv:3', 'column r_knee', "'1e+300'"]),
     ],
 )
 def test_bad_input_is_one_line_and_exit_2(typed, named):
     positions = np.zeros((2, 12))
-    positions[1, JOINTS.index('r_knee')] = np.nan
+    positions[1, JOINTS.index('r_knee')] = 1e300
     write_csv(Path('bad.csv'), [0.0, 0.1], positions)
     Path('kept.mcap').touch()
     done = run_main('demo', *shlex.split(typed))

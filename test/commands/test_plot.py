@@ -1,8 +1,10 @@
 """`leg_fk plot`: pictures from CSV files and bags, what they show, and what is refused."""
 
 import csv
+from itertools import combinations
 import os
 from pathlib import Path
+import re
 import subprocess
 import sys
 from xml.etree import ElementTree
@@ -10,12 +12,13 @@ from xml.etree import ElementTree
 from icub_leg_fk.commands.plot import default_instants
 from icub_leg_fk.kinematics import Catalog, config_file, load_chain
 from icub_leg_fk.tools import drawing
-from icub_leg_fk.tools.recording import ChainTrack, read_csv
+from icub_leg_fk.tools.recording import read_joints
+from icub_leg_fk.tools.tracks import track_of
 import numpy as np
 import pytest
 from support.leg_fk_process import assert_one_line_complaint, leg_fk, run_main
 
-pytest.importorskip('matplotlib')
+Text = pytest.importorskip('matplotlib.text').Text
 
 ROOT = Path(__file__).parents[2]
 LEGS = [load_chain(name) for name in ('left_leg', 'right_leg')]
@@ -24,7 +27,7 @@ JOINTS = LEGS[0].joint_names + LEGS[1].joint_names
 
 @pytest.fixture(scope='module')
 def gait():
-    return read_csv(config_file('examples/synthetic_walk.csv'), JOINTS).first(1.99)
+    return read_joints([config_file('examples/synthetic_walk.csv')], LEGS).first(1.99)
 
 
 @pytest.fixture
@@ -45,7 +48,7 @@ def walking_csv(tmp_path, monkeypatch, gait):
 
 @pytest.fixture
 def tracks(gait):
-    return [gait.track(chain) for chain in LEGS]
+    return [track_of(chain, gait.times, gait.positions_of(chain)) for chain in LEGS]
 
 
 def write_csv(name, header, rows):
@@ -115,23 +118,25 @@ def test_joints_outside_their_ranges_are_found_with_limit_and_time(tracks):
     q = tracks[1].positions.copy()
     q[50:60, 3] = np.radians(5)  # knee -124 .. 4
     q[70, 4] = np.radians(-36)  # ankle pitch -35 .. 35
-    knee, ankle = drawing.outside_ranges(ChainTrack(LEGS[1], tracks[1].times, q))
-    assert (knee.text, ankle.text) == (
-        'r_knee > 4°',
-        'r_ankle_pitch < \N{MINUS SIGN}35°',
-    )
+    knee, ankle = track_of(LEGS[1], tracks[1].times, q).outside
+    assert drawing.range_end(knee) == 'r_knee > 4°'
+    assert drawing.range_end(ankle) == 'r_ankle_pitch < \N{MINUS SIGN}35°'
     assert np.allclose(knee.spans, [(0.5, 0.6)])
     assert np.allclose(ankle.spans, [(0.7, 0.71)])
-    assert drawing.outside_ranges(tracks[1]) == []
+    assert tracks[1].outside == []
 
 
-def test_gaps_break_the_curve(tracks):
+def test_gaps_and_steps_back_break_the_curve(tracks):
     keep = np.r_[0:80, 120:200]
-    cut = [ChainTrack(t.chain, t.times[keep], t.positions[keep]) for t in tracks]
-    assert np.allclose(drawing.gaps(cut), [(0.79, 1.2)])
-    assert drawing.gaps(tracks) == []
-    curve = drawing.feet_figure(cut, [0.5], 'walk').axes[0].lines[0]
-    assert np.flatnonzero(np.isnan(curve.get_ydata())).tolist() == [80]
+    for change, gaps in ((0.0, [(0.79, 1.2)]), (-1.0, [])):
+        times = tracks[0].times[keep] + np.where(keep < 100, 0.0, change)
+        cut = [track_of(t.chain, times, t.positions[keep]) for t in tracks]
+        for track in cut:
+            assert np.allclose(track.gaps, gaps)
+            assert track.breaks.tolist() == [80]
+        curve = drawing.feet_figure(cut, [0.5], 'walk').axes[0].lines[0]
+        assert np.flatnonzero(np.isnan(curve.get_ydata())).tolist() == [80]
+    assert tracks[0].gaps == []
 
 
 def test_a_long_recording_is_a_band_from_its_lowest_to_its_highest_values(tracks):
@@ -139,9 +144,9 @@ def test_a_long_recording_is_a_band_from_its_lowest_to_its_highest_values(tracks
     q[12_345, 3] = -2.0
     times = np.arange(len(q)) / 100
     times[60_000:] += 20.0  # a gap
-    long = ChainTrack(tracks[0].chain, times, q)
+    long = track_of(tracks[0].chain, times, q)
     lowest, highest = drawing.feet_figure([long], [1.0], 'walk').axes[0].lines[:2]
-    z = long.poses[:, 2]
+    z = long.chain.poses(q)[:, 2]
     assert np.nanmin(lowest.get_ydata()) == z.min()
     assert np.nanmax(highest.get_ydata()) == z.max() == z[12_345]
     seconds = lowest.get_xdata()
@@ -161,7 +166,7 @@ def test_from_and_to_cut_the_recording_and_what_is_drawn_is_named(walking_csv):
         'walking.csv   v2_5',
         'left foot',
         'right foot',
-        'z in root_link [m]',
+        'z (up) in root_link [m]',
         'time [s]',
     } <= set(texts)
     assert [texts.count(name) for name in 'xyz'] == [
@@ -282,7 +287,7 @@ def test_failed_picture_leaves_nothing_behind(walking_csv, monkeypatch):
     from matplotlib.figure import Figure
 
     def fail(*args, **kwargs):
-        raise OSError(28, 'No space left on device')
+        raise OSError(28, 'no space left on device')
 
     monkeypatch.setattr(Figure, 'savefig', fail)
     assert_one_line_complaint(
@@ -306,13 +311,14 @@ def test_failed_picture_leaves_nothing_behind(walking_csv, monkeypatch):
             ['walking.csv', '--chains', 'left_leg=v3', 'right_leg'],
             ['left_leg=v3', 'right_leg=v2_5'],
         ),
+        (['walking.csv', '--over', 'nowhere.csv'], ['nowhere.csv']),
         (['walking.csv', '--at', '1,x'], ['1,x']),
         (['walking.csv', '--at', '1,2,3,4,5'], ['1,2,3,4,5', '4']),
         (['walking.csv', '--at', '7'], ['7 s', '0 to 1.99 s']),
         (['walking.csv', '--from', 'x'], ['--from', "'x'"]),
         (['walking.csv', '--from', '3'], ['3 to 1.99 s', '0 to 1.99 s']),
         (['walking.csv', '--from', '1', '--to', '0.5'], ['1 to 0.5 s']),
-        (['walking.csv', '--joint-topic', '/legs'], ['--joint-topic', 'CSV']),
+        (['walking.csv', '--joint-topic', '/legs'], ['--joint-topic', 'no topics']),
         (['walking.csv', '-k', 'no.yaml'], ['no.yaml']),
         (['empty.csv'], ['empty.csv:1', 'header']),
         (['header.csv'], ['header.csv', 'rows']),
@@ -324,8 +330,8 @@ def test_failed_picture_leaves_nothing_behind(walking_csv, monkeypatch):
         (['short.csv'], ['short.csv:6', '12 values under 14 columns']),
         (['long.csv'], ['long.csv:6', '15 values under 14 columns']),
         (['huge.csv'], ['huge.csv:7', 'column r_hip_roll', "'1e300'", 'up to 1e+09']),
-        (['unsorted.csv'], ['unsorted.csv:8', 'column time', '0.05 after 0.06']),
-        (['binary.csv'], ['binary.csv', 'CSV']),
+        (['unsorted.csv'], ['unsorted.csv:8', 'column time', '0.050 after 0.060']),
+        (['binary.csv'], ['binary.csv', 'no column of times']),
         (['broken.mcap'], ['broken.mcap', 'read']),
         (['emptydir'], ['emptydir', 'bag']),
     ],
@@ -445,7 +451,8 @@ chains:
 def test_other_robots_have_a_scale_that_fits(tmp_path):
     (tmp_path / 'arm.yaml').write_text(ARM)
     chain = Catalog.load(tmp_path / 'arm.yaml').chain('arm')
-    track = ChainTrack(chain, np.arange(9.0), np.linspace((0, 0), (1, 2), 9))
+    q = np.linspace((0, 0), (1, 2), 9)
+    track = track_of(chain, np.arange(9.0), q)
     figure = drawing.feet_figure([track], [0.0, 8.0], 'arm')
     assert [panel.get_title(loc='left') for panel in figure.axes[:4]] == [
         'z in base [m]',
@@ -456,8 +463,153 @@ def test_other_robots_have_a_scale_that_fits(tmp_path):
     assert np.allclose(
         figure.axes[1].lines[0].get_ydata(), 2 * np.cos(track.positions[:, 0])
     )
-    assert drawing.outside_ranges(track)[0].text == 'lift > 1.5 m'
+    assert drawing.range_end(track.outside[0]) == 'lift > 1.5 m'
     assert any('squares of 0.5 m' in text.get_text() for text in figure.texts)
+
+
+def still(chain, count, q=0.0):
+    """Return the track of a chain that does not move."""
+    return track_of(chain, np.arange(count) / 100, np.full((count, chain.n), q))
+
+
+def with_gap(track):
+    keep = np.r_[0:50, 150:200]
+    times = track.times[keep] + np.where(keep < 100, 0.0, 40.0)
+    return track_of(track.chain, times, track.positions[keep])
+
+
+def odd_pictures(tracks, tmp_path):
+    """Yield settings of pictures in which texts are many, long or close to each other."""
+    (tmp_path / 'arm.yaml').write_text(ARM.replace('gripper', 'g' * 60))
+    arm = Catalog.load(tmp_path / 'arm.yaml').chain('arm')
+    yield 'walk', tracks, {}
+    yield 'one leg', tracks[:1], {'instants': [0.0]}
+    yield 'x' * 120, tracks, {'orientation': True}
+    yield 'over', tracks, {'over': tracks, 'over_name': 'y' * 60, 'orientation': True}
+    yield 'near', tracks, {'instants': [1.96, 1.97, 1.98, 1.99]}
+    yield (
+        'gap',
+        [with_gap(track) for track in tracks],
+        {'instants': [0.1, 0.2, 41.6, 41.7]},
+    )
+    yield (
+        'degrees',
+        [still(chain, 30, 60.0) for chain in LEGS],
+        {'instants': [0.0, 0.1]},
+    )
+    yield 'folded', [still(chain, 30, 2.0) for chain in LEGS], {'instants': [0.0, 0.1]}
+    yield 'sample', [still(chain, 1) for chain in LEGS], {'instants': [0.0]}
+    yield 'other root', [still(arm, 9, 1.0)], {'instants': [0.0], 'orientation': True}
+    hour = np.tile(tracks[0].positions, (50, 1))
+    long = track_of(LEGS[0], 1e5 + np.arange(len(hour)) / 100, hour)
+    yield 'long', [long, track_of(LEGS[1], long.times, hour)], {'instants': [1e5 + 20]}
+
+
+def test_no_text_is_outside_the_picture_or_over_another(tracks, tmp_path, monkeypatch):
+    shown = {}
+    draw = Text.draw
+
+    def note(text, renderer, *args):
+        if text.get_visible() and text.get_text().strip():
+            shown[text] = text.get_window_extent(renderer)
+        draw(text, renderer, *args)
+
+    monkeypatch.setattr(Text, 'draw', note)
+    for title, drawn, settings in odd_pictures(tracks, tmp_path):
+        shown.clear()
+        instants = settings.pop('instants', [0.5, 0.9, 1.3, 1.7])
+        with drawing.own_settings():
+            figure = drawing.feet_figure(drawn, instants, title, **settings)
+            figure.canvas.draw()
+        width, height = figure.get_size_inches() * figure.dpi
+        assert len(shown) > 10
+        for text, box in shown.items():
+            is_inside = (
+                0 <= box.x0 and box.x1 <= width and 0 <= box.y0 and box.y1 <= height
+            )
+            assert is_inside, (title, text.get_text())
+        for (one, first), (two, second) in combinations(shown.items(), 2):
+            is_over = first.shrunk(0.98, 0.9).overlaps(second)
+            assert not is_over, (title, one.get_text(), two.get_text())
+
+
+def test_two_feet_at_one_place_are_both_seen(tracks):
+    figure = drawing.feet_figure([tracks[0], tracks[0]], [0.5], 'walk')
+    *_, above = figure.axes[0].lines[:3]
+    assert above.is_dashed()
+    assert np.array_equal(above.get_ydata(), figure.axes[0].lines[0].get_ydata())
+
+
+def test_orientation_is_that_from_the_posture_at_zero(tracks):
+    """A turn of the ankle roll joint by 10 deg is one of the foot about its own axis."""
+    q = np.zeros((3, 6))
+    q[1:, 5] = np.radians([10, -10])
+    track = track_of(LEGS[0], np.arange(3.0), q)
+    figure = drawing.feet_figure([track], [0.0], 'walk', orientation=True)
+    curves = [panel.lines[0].get_ydata() for panel in figure.axes[3:6]]
+    R = np.array(
+        [LEGS[0].forward(row)[:3, :3] @ LEGS[0].forward(q[0])[:3, :3].T for row in q]
+    )
+    yaw = np.arctan2(R[:, 1, 0], R[:, 0, 0])
+    pitch = np.arcsin(-R[:, 2, 0])
+    roll = np.arctan2(R[:, 2, 1], R[:, 2, 2])
+    assert np.allclose(curves, np.degrees([roll, pitch, yaw]))
+    assert np.abs(curves).max() == pytest.approx(10)
+    assert figure.axes[3].get_title(loc='left').startswith('roll about x (backward)')
+
+
+def test_another_recording_is_drawn_below(walking_csv):
+    other = walking_csv.with_name('other.csv')
+    other.write_text(walking_csv.read_text())
+    _, errors = plotted(
+        'walking.csv', '--over', 'other.csv', '-o', 'both.svg', '--orientation'
+    )
+    assert errors == ''
+    texts = texts_in('both.svg')
+    assert 'walking.csv   v2_5   over   other.csv   v2_5' in texts
+    assert {
+        'left foot',
+        'left foot, other.csv',
+        'yaw about z (up) from q = 0 [°]',
+    } <= set(texts)
+
+
+def test_legs_are_drawn_only_where_poses_are(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    times = [*np.arange(50) / 100, *(40.5 + np.arange(100) / 100)]
+    rows = [[time, *(0.05 * np.sin(time + np.arange(12)))] for time in times]
+    write_csv('gap.csv', ['time', *JOINTS], rows)
+    plotted('gap.csv', '-o', 'gap.svg')
+    shown = [
+        float(text.split()[1])
+        for text in texts_in('gap.svg')
+        if text and re.fullmatch(r'[ABCD]  [\d.]+ s', text)
+    ]
+    assert len(shown) == 4
+    assert all(min(abs(time - np.array(times))) < 0.01 for time in shown)
+    plotted('gap.csv', '-o', 'at.svg', '--at', '0.201,41')
+    assert {'A  0.20 s', 'B  41.00 s'} <= set(texts_in('at.svg'))
+    done = run_main('plot', 'gap.csv', '-o', 'x.svg', '--at', '20')
+    assert_one_line_complaint(
+        done,
+        '--at: found 20 s, where there is no pose; allowed: 0 to 0.49 '
+        's, 40.5 to 41.49 s',
+    )
+
+
+def test_a_clock_that_steps_back_is_reported(tmp_path, monkeypatch):
+    bag_files = pytest.importorskip('support.bag_files')
+    monkeypatch.chdir(tmp_path)
+    stamps = [10**10 + 10**7 * (i if i < 50 else i - 40) for i in range(100)]
+    bag_files.write_bag(
+        'bag',
+        joints=[
+            (10**10 + 10**7 * i, bag_files.joint_state(stamp))
+            for i, stamp in enumerate(stamps)
+        ],
+    )
+    _, errors = plotted('bag')
+    assert 'time stepped back to 10.100 s' in errors
 
 
 def test_chains_of_several_roots_are_refused(tmp_path, monkeypatch):
