@@ -23,6 +23,7 @@ COMMANDS = {  # and what they are for
     'pose': 'the pose of a foot, or any tip, for one joint vector',
     'explain': 'explain a chain: DH table, each A_i, products, answer',
     'bag': 'copy a bag and add the poses of the feet, as the node sends them',
+    'poses': 'the poses of a recording as numbers: CSV, or arrays for numpy',
     'plot': 'a picture of the feet over time and the legs in space, from a bag or CSV',
     'view': 'a page in the browser: sliders, poses, the DH method step by step',
     'table': 'make the DH table of any robot from its URDF, as a kinematics file',
@@ -41,6 +42,7 @@ examples:
   leg_fk pose left_leg --degrees 0 10 0 -30 -15 5
   leg_fk explain left_leg
   leg_fk bag walking.mcap walking_with_poses.mcap
+  leg_fk poses walking.mcap -o feet.csv
   leg_fk plot walking.mcap -o feet.png
   leg_fk view
   leg_fk table my_robot.urdf --root root_link --tips l_sole r_sole -o my_robot.yaml

@@ -377,7 +377,7 @@ def test_a_terminal_without_utf_8_gets_escapes_instead_of_an_error(
 @pytest.mark.parametrize(
     ('line', 'offered'),
     [
-        ('leg_fk po', {'pose'}),
+        ('leg_fk po', {'pose', 'poses'}),
         ('leg_fk pose --deg', {'--degrees'}),
         ('leg_fk pose left', {'left_leg'}),
         ('leg_fk pose head_imu=', {'v2', 'v3'}),
