@@ -25,10 +25,12 @@ _START = 1_700_000_000 * 1_000_000_000  # ns
 _GAIT_MESSAGES = 100
 _OURS = (sys.executable, '-m', 'icub_leg_fk', 'bag')
 _PLAIN = (sys.executable, '-m', 'bench.plain')
+_POSES = (sys.executable, '-m', 'icub_leg_fk', 'poses')
 _LABELS = {
     'ours': 'leg_fk bag',
     'twists': 'leg_fk bag --twist',
     'plain': 'plain loop over rosbags',
+    'poses': 'leg_fk poses to .npz',
 }
 
 
@@ -67,6 +69,12 @@ def measure_bag(report: Report, quick: bool) -> None:
         'x',
         at_least=3.0,
     )
+    report.row(
+        'bag / poses to .npz',
+        ratio(seconds['ours'], seconds['poses']),
+        'x',
+        at_least=2.0,
+    )
     for name, length in (('short', lengths.short), ('ours', lengths.long)):
         peaks = [run.peak for run in runs[name]]
         report.row(f'bag, peak memory, {length} s', peaks, 'MB', at_most=80.0)
@@ -90,12 +98,14 @@ def _run_all(
         'short': [*_OURS, _write_bag(folder / 'short', lengths.short)],
     }
     pair = [_write_bag(folder / name, lengths.jobs) for name in ('one', 'two')]
-    runs: dict[str, list[_Run]] = {name: [] for name in commands}
+    runs: dict[str, list[_Run]] = {name: [] for name in (*commands, 'poses')}
     jobs: dict[int, list[float]] = {1: [], 2: []}
     out = folder / 'out'
     for _ in range(rounds):
         for name, command in commands.items():
             runs[name].append(_time(command, out, one_core=True))
+        command = [*_POSES, long, '-o']
+        runs['poses'].append(_time(command, folder / 'out.npz', one_core=True))
         for count, readings in jobs.items():
             command = [*_OURS, *pair, '--jobs', str(count), '--out-dir']
             readings.append(_time(command, out).seconds)
@@ -160,5 +170,8 @@ def _time(command: Sequence[str], output: Path, one_core: bool = False) -> _Run:
     seconds = time.perf_counter() - began
     if process.returncode:
         raise LegFKError(f'{" ".join(command)} ended with {process.returncode}')
-    shutil.rmtree(output)
+    if output.is_dir():
+        shutil.rmtree(output)
+    else:
+        output.unlink()
     return _Run(seconds, peak / 1e6)
