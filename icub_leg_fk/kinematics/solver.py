@@ -159,11 +159,16 @@ class Solver:
         """Return x, y, z, qx, qy, qz, qw for n joint positions, which are floats or arrays."""
         x, y, z, qx, qy, qz, qw = self._start
         for theta, d, a, ca, sa, ch, sh, joint, turn_gain, slide_gain in self._rows:
-            y, z = ca * y - sa * z, sa * y + ca * z
+            if ca:
+                y, z = ca * y - sa * z, sa * y + ca * z
+            else:  # a right angle, as most are
+                y, z = -sa * z, sa * y
             qw, qx = ch * qw - sh * qx, ch * qx + sh * qw
             qy, qz = ch * qy - sh * qz, ch * qz + sh * qy
-            x = x + a
-            z = z + d
+            if a:
+                x = x + a
+            if d:
+                z = z + d
             if turn_gain:
                 theta = theta + turn_gain * q[joint]
             elif slide_gain:

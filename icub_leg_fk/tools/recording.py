@@ -62,9 +62,9 @@ class BagTopics(Part):
         self.notes = bag.notes
         self._bag = bag
         self._connections = bag.joint_connections(topics, joints)
-        names = list(dict.fromkeys(each.topic for each in self._connections))
-        self.topic = ' and '.join(names)
-        self.joint_names = bag.joint_names(names)
+        self._topics = list(dict.fromkeys(each.topic for each in self._connections))
+        self.topic = ' and '.join(self._topics)
+        self.joint_names = bag.joint_names(self._topics)
 
     def messages(self, progress: Progress | None = None) -> Messages:
         """Yield time of recording [ns] and CDR bytes of each JointState."""
@@ -77,11 +77,9 @@ class BagTopics(Part):
 
     def topics_with(self, joints: Collection[str]) -> list[str]:
         """Return the other topics of the bag that have some joints."""
+        others = [name for name in self._bag.joint_topics() if name not in self._topics]
         return [
-            name
-            for name in self._bag.joint_topics()
-            if name not in self.topic
-            and set(joints) & set(self._bag.joint_names([name]))
+            name for name in others if set(joints) & set(self._bag.joint_names([name]))
         ]
 
 
@@ -316,23 +314,22 @@ def parts_without_topics(
 def _yarp_logs(path: Path) -> list[Part]:
     """Return the logs of YARP that a path is, or that stand in it; none if it is something else.
 
-    Of those in a directory, the parts whose joints are not known are left out.
+    Those of parts whose joints are not known are left out, with a note.
     """
     if path.name == DATA and path.is_file():
         path = path.parent
-    if is_yarp_log(path):
-        log = YarpLog(path)
-        if not log.joint_names:
-            raise InputFileError(
-                str(path),
-                f'{log.port} is of no known part; allowed: {", ".join(PARTS)}',
-            )
-        return [log]
-    if not path.is_dir() or (path / METADATA).exists():
-        return []
-    logs = [YarpLog(entry) for entry in sorted(path.iterdir()) if is_yarp_log(entry)]
-    known: list[Part] = [log for log in logs if log.joint_names]
-    return known
+    folders = [path]
+    if path.is_dir() and not is_yarp_log(path) and not (path / METADATA).exists():
+        folders = sorted(path.iterdir())
+    logs = [YarpLog(folder) for folder in folders if is_yarp_log(folder)]
+    known = [log for log in logs if log.joint_names]
+    ports = ', '.join(log.port for log in logs if not log.joint_names)
+    if ports and not known:
+        fault = f'{ports} is of no known part; allowed: {", ".join(PARTS)}'
+        raise InputFileError(str(path), fault)
+    if ports:
+        known[0].notes.append(f'left out: {ports}, of which no joint is known')
+    return list(known)
 
 
 def _refuse_other_files(path: Path) -> None:

@@ -25,8 +25,8 @@ GRID = '#dddddd'
 FLOOR = '#f7f7f7'
 
 _ROOT_AXES = 1.2  # sides of a square
-_MARGIN = 0.2  # inches around what is seen, for the names of axes
-_REACHES = (1.2, 1.45, 1.7, 2.0)  # lengths of an axis at which its name may stand
+_MARGIN = 0.22  # inches around what is seen, for the names of axes
+_DISTANCES = (0.12, 0.22, 0.32, 0.42, 0.52)  # inches from an axis to its name
 _POINT = 1 / 72  # inch
 _LEAST_ARROW = 0.12  # inches; a shorter one has no head
 
@@ -250,12 +250,12 @@ class Space:
         if abs(side) >= 0.3:
             place = 'left' if side > 0 else 'right'
         share = {'center': 0.5, 'left': 0.0, 'right': 1.0}[place]
-        for reach in _REACHES:
-            at = self._seen(origin + reach * axis)
-            x, y = (at - self._corner) * self._scale + (
-                self._box.left,
-                self._box.bottom,
-            )
+        start, end = self._seen([origin, origin + axis])
+        length = float(np.linalg.norm(end - start))
+        direction = (end - start) / length if length else np.array([0.0, 1.0])
+        for distance in _DISTANCES:
+            at = end + distance / self._scale * direction
+            x, y = (at - self._corner) * self._scale + self._box[:2]
             box = Box(x - share * width, y - height / 2, width, height)
             if self._box.holds(box) and not any(map(box.meets, self._names)):
                 self._names.append(box)

@@ -288,6 +288,16 @@ def test_parts_of_yarp_are_one_robot_with_the_torso_in_its_order():
     assert done.returncode == 0
 
 
+def test_parts_that_are_not_known_are_left_out_with_a_note():
+    write_log('left_leg', POSITIONS, name='dump/left_leg')
+    write_log('face', POSITIONS, name='dump/face')
+    table, errors = poses('dump', '--chains', 'left_leg')
+    assert_poses_of(table, LEFT, POSITIONS)
+    assert errors == (
+        'leg_fk: note: left out: /icub/face/state:o, of which no joint is known\n'
+    )
+
+
 def test_parts_that_do_not_go_together_are_refused_by_name():
     write_log('left_leg', POSITIONS)
     write_log('left_leg', POSITIONS, name='again')
