@@ -89,14 +89,7 @@ class JointVectorError(LegFKError):
         return f'{self.quantity} {self.fault}; allowed: {self.allowed}'
 
 
-class InputFileError(LegFKError):
-    """A file that cannot be read or does not hold what is needed.
-
-    Attributes:
-        file: path of the file as it was given.
-        fault: what is wrong with it.
-    """
-
+class _FileError(LegFKError):
     def __init__(self, file: str, fault: str) -> None:
         self.file = file
         self.fault = fault
@@ -104,6 +97,15 @@ class InputFileError(LegFKError):
 
     def __str__(self) -> str:
         return f'{self.file}: {self.fault}'
+
+
+class InputFileError(_FileError):
+    """A file that cannot be read or does not hold what is needed.
+
+    Attributes:
+        file: path of the file as it was given.
+        fault: what is wrong with it.
+    """
 
 
 class CatalogError(InputFileError):
@@ -136,21 +138,13 @@ class CatalogError(InputFileError):
         return f'{place}: {self.fault}'
 
 
-class OutputFileError(LegFKError):
+class OutputFileError(_FileError):
     """A file that is to be written and cannot, or must not, such as one that already exists.
 
     Attributes:
         file: path of the file as it was given.
         fault: what is wrong with it.
     """
-
-    def __init__(self, file: str, fault: str) -> None:
-        self.file = file
-        self.fault = fault
-        super().__init__(file, fault)
-
-    def __str__(self) -> str:
-        return f'{self.file}: {self.fault}'
 
 
 class MalformedMessageError(LegFKError):

@@ -8,8 +8,8 @@ Fast CDR leaves in it what was in the buffer before. What Fast CDR takes and thi
 encapsulations other than plain CDR, in which no ROS middleware sends these; a string without NUL
 at its end, or with one before it.
 
-Written are PoseStamped, TwistStamped and TFMessage, little-endian: all but stamps and numbers is
-prepared once.
+Written are JointState, PoseStamped, TwistStamped and TFMessage, little-endian: all but stamps and
+numbers is prepared once.
 """
 
 from collections.abc import Sequence
@@ -153,6 +153,33 @@ class TFMessageEncoder:
         for ids, pose in zip(self._frames, poses, strict=True):
             fields += (sec, nanosec, ids, *pose)
         return self._pack(_ENCAPSULATION, len(self._frames), *fields)
+
+
+class JointStateEncoder:
+    """Serializes JointStates with the same names, which have positions only.
+
+    Args:
+        names: n joint names.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        start = STAMP_END - HEADER
+        count = struct.pack('<I', len(names))
+        head = _aligned(start, _string(''), 4) + count
+        for name in names:
+            head += _aligned(start, _string(name), 4)
+        self._head = _aligned(start, head + count, 8)
+        self._pack = struct.Struct(f'<4siI{len(self._head)}s{len(names)}dII').pack
+
+    def encode(self, stamp: int, positions: Sequence[float]) -> bytes:
+        """Return the bytes of a message.
+
+        Args:
+            stamp: the time [ns].
+            positions: n joint positions [rad or m].
+        """
+        sec, nanosec = divmod(stamp, 1_000_000_000)
+        return self._pack(_ENCAPSULATION, sec, nanosec, self._head, *positions, 0, 0)
 
 
 class _Cursor:

@@ -13,8 +13,9 @@ from pathlib import Path
 import re
 
 from icub_leg_fk.errors import InputFileError
+from icub_leg_fk.stream.cdr import JointStateEncoder
 from icub_leg_fk.tools.input_file import lines_of
-from icub_leg_fk.tools.joint_states import JointStateEncoder, Messages, Part, SECOND
+from icub_leg_fk.tools.joint_states import Messages, Part, SECOND
 from icub_leg_fk.tools.options import LARGEST, number
 from icub_leg_fk.tools.progress import Progress
 

@@ -5,7 +5,7 @@ import io
 from pathlib import Path
 
 from icub_leg_fk import load_chain
-from icub_leg_fk.tools.joint_states import JointStateEncoder
+from icub_leg_fk.stream.cdr import JointStateEncoder
 import numpy as np
 import pytest
 from support.leg_fk_process import assert_one_line_complaint, run_main
