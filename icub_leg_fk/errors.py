@@ -90,6 +90,8 @@ class JointVectorError(LegFKError):
 
 
 class _FileError(LegFKError):
+    """What errors of files share: the file and what is wrong with it."""
+
     def __init__(self, file: str, fault: str) -> None:
         self.file = file
         self.fault = fault
