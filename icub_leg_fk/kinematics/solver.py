@@ -7,9 +7,11 @@ its angle, and the quaternion by half of it,
     Rx(alpha):  (py, pz) by alpha;  (qw, qx) and (qy, qz) by alpha / 2
     Rz(theta):  (px, py) by theta;  (qw, qz) and (qx, qy) by theta / 2
 
-and T_root_0 comes last. The arithmetic is the same for floats and for arrays of N of them; only
-cosine and sine are handed in. The results equal the product of the 4x4 matrices, `Chain.forward`,
-and the Jacobian times the joint velocities, to which the tests hold them.
+and T_root_0 comes last. Where alpha is a right angle, as most are, cos(alpha) is 0 and half of it
+has a cosine and a sine of sqrt(1/2), a factor that the quaternion has from the start. The
+arithmetic is the same for floats and for arrays of N of them; only cosine and sine are handed in.
+The results equal the product of the 4x4 matrices, `Chain.forward`, and the Jacobian times the
+joint velocities, to which the tests hold them.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,6 +31,8 @@ import numpy as np
 BLOCK = 4096  # rows worked on at once: a dozen such arrays stay in the L2 cache
 
 Numbers = Any  # a float, or an (N,) array of them
+
+_NEW_TUPLE = tuple.__new__  # takes half the time of calling a named tuple
 
 
 class Pose(NamedTuple):
@@ -63,15 +67,15 @@ class Twist(NamedTuple):
 class _Row(NamedTuple):
     """The constants of a row, and which joint moves it; 0 is the gain of what does not move."""
 
-    theta: float
-    d: float
-    a: float
     cos_alpha: float
     sin_alpha: float
     cos_half_alpha: float
     sin_half_alpha: float
+    a: float
+    d: float
+    half_theta: float
     joint: int
-    turn_gain: float
+    half_turn_gain: float
     slide_gain: float
 
 
@@ -104,16 +108,12 @@ class Solver:
         T_n_tip: Array,
         R_zero: Array,
     ) -> None:
-        rows = [
-            tuple(_row(link, joint)) for link, joint in zip(links, joints, strict=True)
-        ]
-        self._rows: list[Any] = rows[
-            ::-1
-        ]  # plain tuples, which unpack faster than named ones
-        self._start = (
-            *T_n_tip[:3, 3].tolist(),
-            *matrix_to_quaternion(T_n_tip[:3, :3]).tolist(),
-        )
+        rows = [_row(link, joint) for link, joint in zip(links, joints, strict=True)]
+        right_angles = sum(row.cos_alpha == 0.0 for row in rows)
+        q_tip = matrix_to_quaternion(T_n_tip[:3, :3]) * 2.0 ** (-right_angles / 2)
+        self._start = (*T_n_tip[:3, 3].tolist(), *q_tip.tolist())
+        # Plain tuples unpack faster than named ones.
+        self._rows: list[Any] = [tuple(row) for row in reversed(rows)]
         self._R_root = tuple(T_root_0[:3, :3].ravel().tolist())
         self._t_root = tuple(T_root_0[:3, 3].tolist())
         self._q_root = tuple(matrix_to_quaternion(T_root_0[:3, :3]).tolist())
@@ -127,10 +127,10 @@ class Solver:
         rx, ry, rz, rw = self._reference
         # Adding to 0.0 or taking from it leaves no negative zero.
         if rx * qx + ry * qy + rz * qz + rw * qw >= 0.0:
-            return Pose(
-                0.0 + x, 0.0 + y, 0.0 + z, 0.0 + qx, 0.0 + qy, 0.0 + qz, 0.0 + qw
-            )
-        return Pose(0.0 + x, 0.0 + y, 0.0 + z, 0.0 - qx, 0.0 - qy, 0.0 - qz, 0.0 - qw)
+            values = 0.0 + x, 0.0 + y, 0.0 + z, 0.0 + qx, 0.0 + qy, 0.0 + qz, 0.0 + qw
+        else:
+            values = 0.0 + x, 0.0 + y, 0.0 + z, 0.0 - qx, 0.0 - qy, 0.0 - qz, 0.0 - qw
+        return _NEW_TUPLE(Pose, values)
 
     def poses(self, Q: Array) -> Array:
         """Return the (N, 7) rows x, y, z [m], qx, qy, qz, qw for (N, n) joint positions."""
@@ -158,41 +158,29 @@ class Solver:
     ) -> tuple[Numbers, ...]:
         """Return x, y, z, qx, qy, qz, qw for n joint positions, which are floats or arrays."""
         x, y, z, qx, qy, qz, qw = self._start
-        for theta, d, a, ca, sa, ch, sh, joint, turn_gain, slide_gain in self._rows:
-            if ca:
-                y, z = ca * y - sa * z, sa * y + ca * z
-            else:  # a right angle, as most are
+        for ca, sa, ch, sh, a, d, half, joint, half_gain, slide_gain in self._rows:
+            if not ca:  # a right angle
                 y, z = -sa * z, sa * y
-            qw, qx = ch * qw - sh * qx, ch * qx + sh * qw
-            qy, qz = ch * qy - sh * qz, ch * qz + sh * qy
+                qw, qx = qw - sa * qx, qx + sa * qw
+                qy, qz = qy - sa * qz, qz + sa * qy
+            elif sh:
+                y, z = ca * y - sa * z, sa * y + ca * z
+                qw, qx = ch * qw - sh * qx, ch * qx + sh * qw
+                qy, qz = ch * qy - sh * qz, ch * qz + sh * qy
             if a:
                 x = x + a
             if d:
                 z = z + d
-            if turn_gain:
-                theta = theta + turn_gain * q[joint]
+            if half_gain:
+                half = half + half_gain * q[joint]
             elif slide_gain:
                 z = z + slide_gain * q[joint]
-            half = 0.5 * theta
             c = cos(half)
             s = sin(half)
             qw, qz = c * qw - s * qz, c * qz + s * qw
             qx, qy = c * qx - s * qy, c * qy + s * qx
             c, s = c * c - s * s, 2.0 * c * s
             x, y = c * x - s * y, s * x + c * y
-        return self._in_root(x, y, z, qx, qy, qz, qw)
-
-    def _in_root(
-        self,
-        x: Numbers,
-        y: Numbers,
-        z: Numbers,
-        qx: Numbers,
-        qy: Numbers,
-        qz: Numbers,
-        qw: Numbers,
-    ) -> tuple[Numbers, ...]:
-        """Return a pose in frame 0 as one in the root frame."""
         r00, r01, r02, r10, r11, r12, r20, r21, r22 = self._R_root
         tx, ty, tz = self._t_root
         ax, ay, az, aw = self._q_root
@@ -217,21 +205,21 @@ class Solver:
         """
         x, y, z = self._start[:3]
         vx = vy = vz = wx = wy = wz = 0.0
-        for theta, d, a, ca, sa, _, _, joint, turn_gain, slide_gain in self._rows:
+        for ca, sa, _, _, a, d, half, joint, half_gain, slide_gain in self._rows:
             y, z = ca * y - sa * z, sa * y + ca * z
             vy, vz = ca * vy - sa * vz, sa * vy + ca * vz
             wy, wz = ca * wy - sa * wz, sa * wy + ca * wz
             x = x + a
             z = z + d
-            if turn_gain:
-                theta = theta + turn_gain * q[joint]
-            c = math.cos(theta)
-            s = math.sin(theta)
+            if half_gain:
+                half = half + half_gain * q[joint]
+            c = math.cos(2.0 * half)
+            s = math.sin(2.0 * half)
             x, y = c * x - s * y, s * x + c * y
             vx, vy = c * vx - s * vy, s * vx + c * vy
             wx, wy = c * wx - s * wy, s * wx + c * wy
-            if turn_gain:
-                rate = turn_gain * qdot[joint]
+            if half_gain:
+                rate = 2.0 * half_gain * qdot[joint]
                 vx = vx - rate * y
                 vy = vy + rate * x
                 wz = wz + rate
@@ -251,17 +239,18 @@ class Solver:
 
 def _row(link: DHLink, joint: int) -> _Row:
     """Return a row's constants as Python floats."""
-    cos_alpha, sin_alpha = cos_sin(link.alpha)
-    cos_half_alpha, sin_half_alpha = cos_sin(link.alpha / 2)
+    cosines, sines = cos_sin([link.alpha, link.alpha / 2])
+    cos_alpha, cos_half_alpha = cosines.tolist()
+    sin_alpha, sin_half_alpha = sines.tolist()
     return _Row(
-        link.offset,
-        link.d,
+        cos_alpha,
+        sin_alpha,
+        cos_half_alpha,
+        sin_half_alpha,
         link.a,
-        float(cos_alpha),
-        float(sin_alpha),
-        float(cos_half_alpha),
-        float(sin_half_alpha),
+        link.d,
+        link.offset / 2,
         joint,
-        turn_gain=link.gain if link.joint_type == 'revolute' else 0.0,
+        half_turn_gain=link.gain / 2 if link.joint_type == 'revolute' else 0.0,
         slide_gain=link.gain if link.joint_type == 'prismatic' else 0.0,
     )
