@@ -18,7 +18,6 @@ from collections.abc import Callable, Sequence
 import math
 from typing import Any, NamedTuple
 
-from icub_leg_fk.kinematics.chain_text import short
 from icub_leg_fk.kinematics.link import DHLink
 from icub_leg_fk.kinematics.rotation import (
     Array,
@@ -82,7 +81,7 @@ class _Row(NamedTuple):
 def _short_repr(numbers: Pose | Twist) -> str:
     """Return the numbers by name, with at most six decimals each."""
     fields = zip(numbers._fields, numbers, strict=True)
-    shown = ', '.join(f'{name}={short(value, 6)}' for name, value in fields)
+    shown = ', '.join(f'{name}={round(value, 6) + 0.0:.10g}' for name, value in fields)
     return f'{type(numbers).__name__}({shown})'
 
 
