@@ -31,6 +31,7 @@ from icub_leg_fk.tools.progress import Progress
 import yaml
 
 DEFAULT_TOPIC = '/joint_states'
+STRING = 'std_msgs/msg/String'
 METADATA = 'metadata.yaml'
 STORAGES = {'.mcap': 'mcap', '.db3': 'sqlite3'}
 
@@ -140,21 +141,17 @@ class Bag:
         Raises:
             InputFileError: there are no joint states on one of them; lists the others.
         """
-        known = self.joint_topics()
+        known = self.topics(JOINT_STATE)
         chosen = list(topics) or (known if len(known) == 1 else [DEFAULT_TOPIC])
         for topic in chosen:
             if topic not in known:
                 fault = f'no joint states on {topic}; {self.topics_of(joints)}'
                 raise InputFileError(str(self.path), fault)
-        return [
-            each
-            for each in self.connections
-            if each.topic in chosen and each.msgtype == JOINT_STATE
-        ]
+        return self.connections_of(JOINT_STATE, chosen)
 
     def topics_of(self, joints: Iterable[str]) -> str:
         """Return the topics of joint states in words, those with some joints by themselves."""
-        known = self.joint_topics()
+        known = self.topics(JOINT_STATE)
         if not known:
             return f'it has no topic of type {JOINT_STATE}'
         wanted = set(joints)
@@ -170,19 +167,27 @@ class Bag:
     def joint_names(self, topics: Collection[str]) -> tuple[str, ...]:
         """Return the joints that the first messages of some topics have."""
         names: dict[str, None] = {}
-        for each in self.connections:
-            if each.topic not in topics or each.msgtype != JOINT_STATE:
-                continue
+        for each in self.connections_of(JOINT_STATE, topics):
             for _, _, data in islice(self.messages([each]), 1):
                 with suppress(MalformedMessageError):
                     names.update(dict.fromkeys(read_layout(data).names))
         return tuple(names)
 
-    def joint_topics(self) -> list[str]:
-        """Return the topics of joint states."""
+    def topics(self, message_type: str) -> list[str]:
+        """Return the topics of a type."""
         return sorted(
-            {each.topic for each in self.connections if each.msgtype == JOINT_STATE}
+            {each.topic for each in self.connections if each.msgtype == message_type}
         )
+
+    def connections_of(
+        self, message_type: str, topics: Collection[str]
+    ) -> list[Connection]:
+        """Return those of some topics and a type."""
+        return [
+            each
+            for each in self.connections
+            if each.topic in topics and each.msgtype == message_type
+        ]
 
     def messages(
         self, connections: Iterable[Connection], progress: Progress | None = None
@@ -245,6 +250,11 @@ def new_bag(path: str | Path, storage: str, *, force: bool) -> Iterator[Any]:
         if is_file:
             (file,) = directory.glob(f'*{place.suffix}')
             file.rename(place)
+
+
+def namespace_of(topics: Iterable[str]) -> str:
+    """Return the namespace that topics share: empty, or with a slash before it."""
+    return os.path.commonpath([os.path.dirname(topic) for topic in topics]).rstrip('/')
 
 
 def reliable_qos(depth: int) -> Any:
