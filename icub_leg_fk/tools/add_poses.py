@@ -28,7 +28,7 @@ from icub_leg_fk.stream.configuration import (
     LEGS,
 )
 from icub_leg_fk.stream.joint_input import Look
-from icub_leg_fk.stream.notes import names_that_came, notes_of
+from icub_leg_fk.stream.notes import name_hint, names_that_came, notes_of
 from icub_leg_fk.stream.pose_stream import PoseStream, Send, Senders
 from icub_leg_fk.tools.bags import (
     Bag,
@@ -203,7 +203,7 @@ def add_foot_poses(
             poses = _Poses(writer, added, copy, types)
             _run(bag, joint_states, copy, poses, progress)
             look = poses.robot_input.take_look()
-            _refuse_strangers(source, look)
+            _refuse_strangers(source, look, joint_prefix)
     notes = notes_of(look, ' and '.join(topics), joint_prefix, PREFIX_OPTION)
     return Summary(
         source=str(source),
@@ -494,7 +494,8 @@ class _Poses:
     def take(self, timestamp: int, data: bytes) -> None:
         """Take a message of joint states in, and write what it gives."""
         self._time = timestamp
-        self._stream.send(self.robot_input.feed(timestamp, data))
+        vectors = self.robot_input.feed(timestamp, data)  # which may begin a new stream
+        self._stream.send(vectors)
 
     def _sender(self, writer: Any, connection: Any) -> Send:
         write = writer.write
@@ -562,7 +563,7 @@ def _namespace(namespace: str | None, topics: Sequence[str]) -> str:
     return f'/{words}' if words else ''
 
 
-def _refuse_strangers(source: str | Path, look: Look) -> None:
+def _refuse_strangers(source: str | Path, look: Look, joint_prefix: str) -> None:
     """Refuse a recording of which no joint belongs to any chain."""
     if look.joints or look.rejected.keys() - {'time_jump'}:
         return
@@ -571,9 +572,11 @@ def _refuse_strangers(source: str | Path, look: Look) -> None:
         f'{name} needs {", ".join(each.chain.joint_names)}'
         for name, each in look.chains.items()
     )
+    joints = [name for each in look.chains.values() for name in each.chain.joint_names]
+    hint = name_hint(joints, look.names, joint_prefix, PREFIX_OPTION)
     raise InputFileError(
         str(source),
-        f'no message {fault}; {wanted}; names found: {names_that_came(look)}',
+        f'no message {fault}; {wanted}; names found: {names_that_came(look)}{hint}',
     )
 
 
