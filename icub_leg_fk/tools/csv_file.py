@@ -110,14 +110,8 @@ class CsvFile(Part):
     def messages(self, progress: Progress | None = None) -> Messages:
         """Yield time [ns] and CDR bytes of a JointState per row that has joint positions."""
         encoder = _RowEncoder(self._groups)
-        before = Decimal('-Infinity')
         for row in self._rows(progress):
             time = self._time_of(row)
-            if time < before:
-                raise self._fault(
-                    row, self._time, f'{time} after {before}', 'times in order'
-                )
-            before = time
             stamp = round(time * self._factor)
             if abs(stamp) >= _LAST_TIME:
                 raise self._fault(
@@ -133,7 +127,7 @@ class CsvFile(Part):
     def span(self) -> tuple[int, int]:
         """Return the first and the last time [ns]."""
         times = [self._time_of(row) for row in self._rows()]
-        return round(times[0] * self._factor), round(times[-1] * self._factor)
+        return round(min(times) * self._factor), round(max(times) * self._factor)
 
     def _rows(self, progress: Progress | None = None) -> Iterator[Row]:
         """Yield the rows after the header; empty lines and comments are none."""

@@ -229,7 +229,10 @@ def _described(wanted: Described, sent: Sequence[_Sent], start: int) -> Robot:
             _refuse_other_places(configuration.chains, robot.periods)
         except LegFKError as error:
             fault = error.fault if isinstance(error, ParameterError) else str(error)
-            robot.warnings.append(f'description of the robot {after} not used: {fault}')
+            stays = '; the one before stays' if robot.periods else ''
+            robot.warnings.append(
+                f'description of the robot {after} not used: {fault}{stays}'
+            )
             continue
         robot.warnings += configuration.warnings
         since = f'from {after} on ' if robot.periods else ''
