@@ -55,11 +55,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'bags',
         metavar='BAG',
         nargs='+',
+        type=options.path,
         help='the bag to read and the bag to '
         'make; with --out-dir, all are bags to read',
     )
     parser.add_argument(
-        '--out-dir', metavar='DIR', help='where each gets one of the same name'
+        '--out-dir',
+        metavar='DIR',
+        type=options.path,
+        help='where each gets one of the same name',
     )
     parser.add_argument(
         '--jobs',

@@ -52,6 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--over',
         metavar='RECORDING',
         nargs='+',
+        type=options.path,
         default=(),
         help='another recording, over which the first is drawn',
     )

@@ -41,6 +41,10 @@ _MEND = {
     '.mcap': '`mcap recover` may mend it',
     '.db3': '`ros2 bag reindex` may mend it',
 }
+_BEGINNINGS = {  # of files, by which they are known
+    '.mcap': ('an MCAP file', b'\x89MCAP0\r\n'),
+    '.db3': ('an SQLite database', b'SQLite format 3\0'),
+}
 _CLEAN = re.compile(r'/?(?!/)[A-Za-z0-9._/ +@:,=-]*')  # what also sqlite takes as it is
 _MOST_METADATA = 1 << 24  # bytes
 _TAIL = 1 << 20  # bytes of an MCAP file, with its summary
@@ -373,8 +377,6 @@ def _reason_and_mend(directory: Path, reason: str) -> tuple[str, str]:
 
 def _refuse_other_recordings(path: Path) -> None:
     """Refuse what is no recording of ROS 2, or not all of one, where rosbags would not say so."""
-    if not path.exists():
-        raise InputFileError(str(path), 'there is no such file or directory')
     files = [path]
     if path.is_dir():
         files = sorted(entry for entry in path.iterdir() if entry.suffix in STORAGES)
@@ -389,6 +391,7 @@ def _refuse_other_recordings(path: Path) -> None:
         )
     encodings = _encodings_in_metadata(path / METADATA)
     for file in files:
+        _refuse_other_content(path, file)
         if file.suffix == '.db3':
             _refuse_waiting_messages(path, file)
         if file.suffix == '.mcap':
@@ -398,6 +401,20 @@ def _refuse_other_recordings(path: Path) -> None:
             str(path), 'is an MCAP file of ROS 1 messages; allowed: of ROS 2'
         )
     _refuse_other_than_cdr(path, encodings)
+
+
+def _refuse_other_content(path: Path, file: Path) -> None:
+    """Refuse a file that has nothing of what its name says, and which nothing mends."""
+    if file.suffix not in _BEGINNINGS:
+        return
+    kind, beginning = _BEGINNINGS[file.suffix]
+    head = first_bytes(file, len(beginning))
+    if head == beginning:
+        return
+    fault = f'is not {kind}' if head else 'is empty'
+    raise InputFileError(
+        str(path), fault if file == path else f'{file.name} in it {fault}'
+    )
 
 
 def _refuse_waiting_messages(path: Path, file: Path) -> None:

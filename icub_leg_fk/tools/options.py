@@ -25,7 +25,7 @@ def add(parser: argparse._ActionsContainer, *names: str) -> None:
 
 def add_output(parser: argparse.ArgumentParser, purpose: str) -> None:
     """Add `--output` and `--force`."""
-    parser.add_argument('-o', '--output', metavar='FILE', help=purpose)
+    parser.add_argument('-o', '--output', metavar='FILE', type=path, help=purpose)
     add(parser, '--force')
 
 
@@ -56,6 +56,13 @@ def add_joint_positions(parser: argparse.ArgumentParser, *, required: bool) -> N
             type=_joint_position,
             help=f'joint positions in {unit}, root to tip; of a prismatic joint always in metres',
         )
+
+
+def path(text: str) -> str:
+    """Return the path that a text is; an unset variable of the shell leaves an empty one."""
+    if not text:
+        raise argparse.ArgumentTypeError("found '', allowed: a path")
+    return text
 
 
 def number(text: str) -> float:
@@ -309,6 +316,7 @@ _OPTIONS: dict[str, dict[str, Any]] = {
     'recordings': {
         'metavar': 'RECORDING',
         'nargs': '+',
+        'type': path,
         'help': 'bag, CSV file or directory of yarpdatadumper',
     },
     '--root': {

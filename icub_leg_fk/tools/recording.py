@@ -9,6 +9,7 @@ from array import array
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager, ExitStack
 from dataclasses import dataclass
+import errno
 import heapq
 from operator import itemgetter
 from pathlib import Path
@@ -332,9 +333,15 @@ def has_topics(path: Path) -> bool:
     Raises:
         InputFileError: there is nothing, or something else.
     """
-    if not path.exists():
-        fault = f'there is no such file or directory; allowed: {KINDS}'
-        raise InputFileError(str(path), fault)
+    try:
+        path.stat()
+    except OSError as error:
+        faults = {
+            errno.ENOENT: f'there is no such file or directory; allowed: {KINDS}',
+            errno.ELOOP: 'is a loop of links, which lead to no file',
+        }
+        fault = f'cannot be read: {str(error.strerror).lower()}'
+        raise InputFileError(str(path), faults.get(error.errno or 0, fault)) from error
     if _is_csv(path) or _log_folders(path):
         return False
     _refuse_other_files(path)

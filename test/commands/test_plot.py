@@ -297,6 +297,9 @@ def test_failed_picture_leaves_nothing_behind(walking_csv, monkeypatch):
     ('words', 'named'),
     [
         (['nowhere.csv'], ['nowhere.csv']),
+        ([''], ["argument RECORDING: found ''"]),
+        (['walking.csv', '-o', ''], ["found ''"]),
+        (['loop'], ['loop: is a loop of links']),
         (['walking.csv', '-o', 'feet.bmp'], ['.bmp', '.png, .svg, .pdf']),
         (['walking.csv', '-o', 'none/feet.png'], ['none/feet.png', 'directory']),
         (['walking.csv', '-o', '-'], ['-: is standard output']),
@@ -374,6 +377,7 @@ def spoil(good):
     Path('binary.csv').write_bytes(b'\xff\xfe\x00\x01' * 100)
     Path('broken.mcap').write_bytes(b'\x89MCAP0\r\n' + b'nothing' * 9)
     Path('emptydir').mkdir()
+    Path('loop').symlink_to('loop')
 
 
 def test_bag_without_joint_states_lists_what_it_has(tmp_path, monkeypatch):
