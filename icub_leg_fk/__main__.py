@@ -15,7 +15,7 @@ import sys
 
 from icub_leg_fk import __version__
 from icub_leg_fk.errors import LegFKError, UnknownNameError
-from icub_leg_fk.tools.command_line import Parser
+from icub_leg_fk.tools.command_line import complaint, Parser
 from icub_leg_fk.tools.signals import stop_on_signals
 
 COMMANDS = {  # and what they are for
@@ -140,7 +140,7 @@ def _complete(line: str) -> None:
 
 
 def _complain(error: Exception) -> None:
-    print(f'leg_fk: error: {" ".join(str(error).split())}', file=sys.stderr)
+    print(f'leg_fk: error: {complaint(error)}', file=sys.stderr)
 
 
 def _forget_output() -> None:

@@ -12,11 +12,12 @@ import signal
 import sys
 from typing import Any, NamedTuple
 
-from icub_leg_fk.errors import LegFKError, OutputFileError, ParameterError
+from icub_leg_fk.errors import LegFKError, OutputFileError
 from icub_leg_fk.stream.configuration import DEFAULT_TIMEOUT
 from icub_leg_fk.tools import options
 from icub_leg_fk.tools.add_poses import add_foot_poses, Summary
 from icub_leg_fk.tools.bags import STORAGES
+from icub_leg_fk.tools.command_line import complaint
 from icub_leg_fk.tools.output_file import refuse_option_like
 from icub_leg_fk.tools.progress import shown_progress
 from icub_leg_fk.tools.text import columns, indented
@@ -54,11 +55,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'bags',
         metavar='BAG',
         nargs='+',
+        type=options.path,
         help='the bag to read and the bag to '
         'make; with --out-dir, all are bags to read',
     )
     parser.add_argument(
-        '--out-dir', metavar='DIR', help='where each gets one of the same name'
+        '--out-dir',
+        metavar='DIR',
+        type=options.path,
+        help='where each gets one of the same name',
     )
     parser.add_argument(
         '--jobs',
@@ -67,16 +72,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=1,
         help='bags to work on at a time (default: 1)',
     )
-    options.add(
-        parser,
-        '--chains',
-        '--version',
-        '--foot-frame',
-        '--joint-topic',
-        '--time-unit',
-        '--kinematics-file',
-        '--force',
-    )
+    options.add_recording(parser)
+    options.add(parser, '--force')
     parser.add_argument(
         '--namespace',
         metavar='NAME',
@@ -232,10 +229,7 @@ def _positive_integer(text: str) -> int:
 
 def _fault(task: _Task, error: LegFKError, tasks: int) -> str:
     """Return one line on what went wrong with a bag, which is named if there are several."""
-    line = str(error)
-    if isinstance(error, ParameterError):
-        line = f'--{error.parameter.replace("_", "-")}: {error.fault}'
-    line = ' '.join(line.split())
+    line = complaint(error)
     return (
         line if tasks == 1 or line.startswith(task.source) else f'{task.source}: {line}'
     )

@@ -1,6 +1,7 @@
 """`leg_fk plot`: a picture of the feet over time and of the legs in space."""
 
 import argparse
+from collections import Counter
 from collections.abc import Sequence
 import math
 import os
@@ -12,6 +13,7 @@ from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.tools import options
 from icub_leg_fk.tools.drawing import check_output, feet_figure, LETTERS, save_picture
 from icub_leg_fk.tools.progress import Progress, shown_progress
+from icub_leg_fk.tools.recorded_robot import Described, recorded_chains
 from icub_leg_fk.tools.tracks import ChainTrack, read_tracks, time_span
 import numpy as np
 
@@ -40,12 +42,7 @@ _SPANS_SHOWN = 4
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument(
-        'recordings',
-        metavar='RECORDING',
-        nargs='+',
-        help='bag, CSV file or directory of yarpdatadumper',
-    )
+    options.add(parser, 'recordings')
     options.add_output(
         parser,
         'picture to write, .png, .svg or .pdf (default: the name of '
@@ -55,6 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--over',
         metavar='RECORDING',
         nargs='+',
+        type=options.path,
         default=(),
         help='another recording, over which the first is drawn',
     )
@@ -64,15 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='also draw roll, pitch and yaw, which turn a tip from its '
         'orientation at q = 0 about the axes of the root',
     )
-    options.add(
-        parser,
-        '--chains',
-        '--version',
-        '--foot-frame',
-        '--joint-topic',
-        '--time-unit',
-        '--kinematics-file',
-    )
+    options.add_recording(parser)
     parser.add_argument(
         '--at',
         metavar='T[,T...]',
@@ -102,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
     name = _name(args.recordings)
     output = args.output or f'{Path(name).stem}.png'
     check_output(output, args.force)
-    chains = options.chains_of_one_root(args)
+    chains = recorded_chains(args)
     with shown_progress(name) as progress:
         tracks = _tracks(args.recordings, chains, args, _part(progress, 0.0))
         over = (
@@ -126,13 +116,17 @@ def run(args: argparse.Namespace) -> int:
             output,
             force=args.force,
         )
-    print(f'{output}: {", ".join(map(_pose_count, tracks))}')
+    counts = Counter[str]()
+    for track in tracks:
+        counts[track.chain.tip] += track.count
+    words = [f'{n} pose{"s" * (n != 1)} of {tip}' for tip, n in counts.items()]
+    print(f'{output}: {", ".join(words)}')
     return 0
 
 
 def _tracks(
     recordings: Sequence[str],
-    chains: Sequence[Chain],
+    chains: Sequence[Chain] | Described,
     args: argparse.Namespace,
     progress: Progress | None,
 ) -> list[ChainTrack]:
@@ -143,6 +137,7 @@ def _tracks(
         args.joint_topics,
         progress,
         time_unit=args.time_unit,
+        joint_prefix=args.joint_prefix,
         begin=args.begin,
         end=args.end,
     )
@@ -161,7 +156,8 @@ def default_instants(tracks: Sequence[ChainTrack]) -> list[float]:
         instants = _far_apart(one, two)
         if len(set(instants)) == _INSTANTS:
             return sorted(instants)
-    times = tracks[0].times
+    name = tracks[0].chain.name
+    times = np.hstack([track.times for track in tracks if track.chain.name == name])
     rows = np.linspace(0, len(times) - 1, _INSTANTS).round().astype(int)
     return sorted({float(time) for time in times[rows]})
 
@@ -255,7 +251,3 @@ def _title(recordings: Sequence[str], tracks: Sequence[ChainTrack]) -> str:
     """Return the name of a recording, with the versions of the chains."""
     versions = ', '.join(dict.fromkeys(track.chain.version for track in tracks))
     return f'{_shown(recordings)}   {versions}'
-
-
-def _pose_count(track: ChainTrack) -> str:
-    return f'{track.count} pose{"s" * (track.count != 1)} of {track.chain.tip}'

@@ -17,6 +17,7 @@ from icub_leg_fk.tools.pose_table import (
     Sink,
 )
 from icub_leg_fk.tools.progress import shown_progress
+from icub_leg_fk.tools.recorded_robot import recorded_chains
 from icub_leg_fk.tools.recording import follow, open_recording, warnings_of
 
 EXAMPLES = """\
@@ -37,24 +38,11 @@ _FORMATS = ('.csv', '.npz')
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument(
-        'recordings',
-        metavar='RECORDING',
-        nargs='+',
-        help='bag, CSV file or directory of yarpdatadumper',
-    )
+    options.add(parser, 'recordings')
     options.add_output(
         parser, 'file to write, .csv or .npz (default: CSV to standard output)'
     )
-    options.add(
-        parser,
-        '--chains',
-        '--version',
-        '--foot-frame',
-        '--joint-topic',
-        '--time-unit',
-        '--kinematics-file',
-    )
+    options.add_recording(parser)
     parser.add_argument(
         '--twist',
         action='store_true',
@@ -66,23 +54,27 @@ def run(args: argparse.Namespace) -> int:
     """Write the table."""
     if args.output not in (None, STANDARD_OUTPUT):
         _check_output(args.output, args.force)
-    chains = options.chains_of_one_root(args)
-    columns = column_names(chains, args.twist)
     name = Path(args.recordings[0]).name
     with (
         shown_progress(name) as progress,
         open_recording(
-            args.recordings, chains, args.joint_topics, args.time_unit
+            args.recordings,
+            recorded_chains(args),
+            args.joint_topics,
+            args.time_unit,
+            args.joint_prefix,
         ) as recording,
-        _sink(args.output, columns, args.force) as sink,
     ):
-        table = PoseTable(chains, args.twist, sink)
-        look = follow(
-            recording, chains, table.take, velocities=args.twist, progress=progress
-        )
-        table.finish()
-        poseless = [name for name, count in table.counts.items() if not count]
-        warnings = warnings_of(recording, look, poseless)
+        chains = recording.robot.periods[0].chains
+        columns = column_names(chains, args.twist)
+        with _sink(args.output, columns, args.force) as sink:
+            table = PoseTable(chains, args.twist, sink)
+            look = follow(
+                recording, table.take, velocities=args.twist, progress=progress
+            )
+            table.finish()
+            poseless = [name for name, count in table.counts.items() if not count]
+            warnings = warnings_of(recording, look, poseless)
     options.print_notes(warnings, recording.notes)
     if args.output not in (None, STANDARD_OUTPUT):
         counts = ', '.join(

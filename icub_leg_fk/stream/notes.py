@@ -50,13 +50,19 @@ class Note(NamedTuple):
         return f'{self.chain}: {self.text}' if self.chain else self.text
 
 
-def notes_of(look: Look, topic: str = '', joint_prefix: str = '') -> list[Note]:
+def notes_of(
+    look: Look,
+    topic: str = '',
+    joint_prefix: str = '',
+    prefix_setting: str = 'joint_prefix:=',
+) -> list[Note]:
     """Return what there is to say of what happened since the last look.
 
     Args:
         look: what happened.
         topic: the topic on which the messages came; empty if they came otherwise.
         joint_prefix: what is before the joint names of the chains.
+        prefix_setting: what is written before another such prefix to have it looked for.
     """
     on_topic = f' on {topic}' if topic else ''
     texts = dict(_of_messages(look, on_topic))
@@ -64,7 +70,8 @@ def notes_of(look: Look, topic: str = '', joint_prefix: str = '') -> list[Note]:
     for name, chain_look in look.chains.items():
         texts = dict(_of_chain(chain_look))
         texts.update(_of_frame_ids(look, chain_look))
-        texts.update(_of_names(look, chain_look, on_topic, joint_prefix))
+        names = _of_names(look, chain_look, on_topic, joint_prefix, prefix_setting)
+        texts.update(names)
         notes += [Note(key, name, WARNING, texts[key]) for key in texts]
     return notes
 
@@ -147,23 +154,40 @@ def _of_frame_ids(look: Look, chain_look: ChainLook) -> Iterator[tuple[str, str]
 
 
 def _of_names(
-    look: Look, chain_look: ChainLook, on_topic: str, joint_prefix: str
+    look: Look,
+    chain_look: ChainLook,
+    on_topic: str,
+    joint_prefix: str,
+    prefix_setting: str,
 ) -> Iterator[tuple[str, str]]:
     """Yield a warning if no joint of a chain has come."""
     joints = chain_look.chain.joint_names
     if not look.names or not look.joints.isdisjoint(joints):
         return
+    hint = name_hint(joints, look.names, joint_prefix, prefix_setting)
     yield (
         'no_match',
         (
             f'no message{on_topic} has one of its joints ({", ".join(joints)}); names that came: '
-            f'{names_that_came(look)}{_hint(joints, look.names, joint_prefix)}'
+            f'{names_that_came(look)}{hint}'
         ),
     )
 
 
-def _hint(joints: Sequence[str], names: Iterable[str], joint_prefix: str) -> str:
-    """Return what may help where no name is that of a joint; empty if nothing is like one."""
+def name_hint(
+    joints: Sequence[str],
+    names: Iterable[str],
+    joint_prefix: str,
+    prefix_setting: str,
+) -> str:
+    """Return what may help where no name is that of a joint; empty if nothing is like one.
+
+    Args:
+        joints: names of joints.
+        names: names that came.
+        joint_prefix: what is before the names of the joints.
+        prefix_setting: what is written before another such prefix to have it looked for.
+    """
     bare = [joint.removeprefix(joint_prefix) for joint in joints]
     pair = _near(bare, names)
     if not pair:
@@ -171,7 +195,7 @@ def _hint(joints: Sequence[str], names: Iterable[str], joint_prefix: str) -> str
     name, joint = pair
     if name.endswith(joint):
         prefix = name.removesuffix(joint) or '""'
-        return f'; {name!r} is looked for with joint_prefix:={prefix}'
+        return f'; {name!r} is looked for with {prefix_setting}{prefix}'
     return f'; {name!r} is nearly {joint_prefix + joint!r}, but names must be equal'
 
 

@@ -16,7 +16,6 @@ from typing import Any
 
 from icub_leg_fk.errors import (
     InputFileError,
-    LegFKError,
     OutputFileError,
     ParameterError,
 )
@@ -28,14 +27,15 @@ from icub_leg_fk.stream.configuration import (
     DEFAULT_TIMEOUT,
     LEGS,
 )
-from icub_leg_fk.stream.joint_input import JointInput, Look
-from icub_leg_fk.stream.notes import names_that_came, notes_of
+from icub_leg_fk.stream.joint_input import Look
+from icub_leg_fk.stream.notes import name_hint, names_that_came, notes_of
 from icub_leg_fk.stream.pose_stream import PoseStream, Send, Senders
 from icub_leg_fk.tools.bags import (
     Bag,
     Connection,
     DEFAULT_TOPIC,
     import_rosbags,
+    namespace_of,
     new_bag,
     open_bag,
     reliable_qos,
@@ -44,7 +44,19 @@ from icub_leg_fk.tools.bags import (
 from icub_leg_fk.tools.joint_states import SECOND
 from icub_leg_fk.tools.output_file import check_target, is_bag
 from icub_leg_fk.tools.progress import Progress
-from icub_leg_fk.tools.recording import parts_without_topics, Recording
+from icub_leg_fk.tools.recorded_robot import (
+    Described,
+    refuse_second_source,
+    Robot,
+    robot_of,
+    RobotInput,
+)
+from icub_leg_fk.tools.recording import (
+    has_topics,
+    open_recording,
+    PREFIX_OPTION,
+    Recording,
+)
 
 NODE = 'foot_pose_publisher'
 POSE = 'geometry_msgs/msg/PoseStamped'
@@ -98,6 +110,9 @@ def add_foot_poses(
     chains: Sequence[str] = LEGS,
     version: str = '',
     kinematics_file: str | None = None,
+    description_from_topic: bool | str = False,
+    root: str | None = None,
+    joint_prefix: str = '',
     foot_frame: str = DEFAULT_FRAME,
     frame_prefix: str = '',
     joint_timeout: float = DEFAULT_TIMEOUT,
@@ -120,7 +135,12 @@ def add_foot_poses(
         target: directory to make, or a file if its name ends in .mcap or .db3.
         chains: chains of the kinematics file, such as `left_leg` or `head_imu=v2`.
         version: version of every chain that is named without one; empty is its default.
-        kinematics_file: path of a kinematics file; the shipped one if None.
+        kinematics_file: path of a kinematics file or a URDF; the shipped one if None.
+        description_from_topic: whether the robot's own URDF in the recording is computed with, or
+            the topic that it is on, if not `robot_description` in the namespace of the joint
+            states.
+        root: of a URDF, the link that poses are given in; `root_link` or else the top if None.
+        joint_prefix: put before every joint name that is looked for.
         foot_frame: a tip frame's name.
         frame_prefix: put before every frame id.
         joint_timeout: age of a joint beside the newest of its chain that holds the chain back [s].
@@ -142,24 +162,34 @@ def add_foot_poses(
         ParameterError: a choice is not valid.
     """
     began = time.monotonic()
-    configuration = Configuration.checked(
-        Catalog.load(kinematics_file),
-        chains=chains,
-        version=version,
-        foot_frame=foot_frame,
-        frame_prefix=frame_prefix,
-        joint_timeout=joint_timeout,
-        publish_tf=tf,
-        publish_twist=twist,
-    )
+    settings: dict[str, Any] = {
+        'chains': chains,
+        'version': version,
+        'joint_prefix': joint_prefix,
+        'foot_frame': foot_frame,
+        'frame_prefix': frame_prefix,
+        'joint_timeout': joint_timeout,
+        'publish_tf': tf,
+        'publish_twist': twist,
+    }
+    wanted: Sequence[Chain] | Described
+    if description_from_topic:
+        refuse_second_source(kinematics_file)
+        configuration = Configuration.checked(None, **settings)
+        wanted = Described(description_from_topic, root, settings)
+    else:
+        catalog = Catalog.load(kinematics_file, root=root)
+        configuration = Configuration.checked(catalog, **settings)
+        wanted = configuration.chains
     _refuse_overlap(source, target)
     storage = _chosen_storage(Path(source), Path(target), storage)
     check_target(target, force=force, may_replace=is_bag)
-    with _open(Path(source), configuration.chains, time_unit) as bag:
-        joints = [name for chain in configuration.chains for name in chain.joint_names]
+    with _open(source, wanted, joint_topics, time_unit, joint_prefix) as (bag, robot):
+        chains_first = robot.periods[0].chains
+        joints = [name for chain in chains_first for name in chain.joint_names]
         joint_states = bag.joint_connections(joint_topics, joints)
         topics = list(dict.fromkeys(each.topic for each in joint_states))
-        added = _Added(configuration, _namespace(namespace, topics))
+        added = _Added(configuration, robot, _namespace(namespace, topics))
         types = _Types()
         old = _OldPoses(bag, [] if only_poses else bag.connections, added, types)
         if old.found and not replace_poses:
@@ -172,9 +202,9 @@ def add_foot_poses(
             copy = _Copy(writer, bag, old, types)
             poses = _Poses(writer, added, copy, types)
             _run(bag, joint_states, copy, poses, progress)
-            look = poses.joint_input.take_look()
-            _refuse_strangers(source, look, configuration.chains)
-    notes = notes_of(look, ' and '.join(topics))
+            look = poses.robot_input.take_look()
+            _refuse_strangers(source, look, joint_prefix)
+    notes = notes_of(look, ' and '.join(topics), joint_prefix, PREFIX_OPTION)
     return Summary(
         source=str(source),
         target=str(target),
@@ -185,14 +215,15 @@ def add_foot_poses(
         held_back={name: dict(chain.held_back) for name, chain in look.chains.items()},
         warnings=[
             *configuration.warnings,
-            *(str(note) for note in notes if note.level == 'warning'),
+            *robot.warnings,
+            *map(str, notes),
         ],
         notes=[
             *bag.notes,
             *configuration.notes,
+            *robot.notes,
             *old.notes,
             *types.notes,
-            *(str(note) for note in notes if note.level != 'warning'),
         ],
         recorded=(bag.span[1] - bag.span[0]) / SECOND,
         took=time.monotonic() - began,
@@ -204,20 +235,25 @@ class _Added:
 
     Args:
         configuration: what is to be published.
+        robot: whose poses these are.
         namespace: where; empty, or with a slash before it.
 
     Attributes:
         configuration: the same.
+        robot: the same.
         topics: types by topic.
         frames: child frames of the transforms.
     """
 
-    def __init__(self, configuration: Configuration, namespace: str) -> None:
+    def __init__(
+        self, configuration: Configuration, robot: Robot, namespace: str
+    ) -> None:
         self.configuration = configuration
+        self.robot = robot
         self._namespace = namespace
         self.topics: dict[str, str] = {}
         self.frames: set[str] = set()
-        for chain in configuration.chains:
+        for chain in robot.chains():
             self.topics[self.topic(chain, 'pose')] = POSE
             if configuration.publish_twist:
                 self.topics[self.topic(chain, 'twist')] = TWIST
@@ -261,9 +297,7 @@ class _NoBag:
     def joint_connections(
         self, topics: Sequence[str], joints: Iterable[str]
     ) -> list[Connection]:
-        """Return the only connection; refuse topics, which there are none of."""
-        if topics:
-            raise LegFKError(f'--joint-topic: {self._recording.name} has no topics')
+        """Return the only connection."""
         return self.connections
 
     def messages(
@@ -417,19 +451,13 @@ class _Poses:
     """Writes what joint states give.
 
     Attributes:
-        joint_input: what takes the joint states.
+        robot_input: what takes the joint states.
         added: messages written, by topic.
     """
 
     def __init__(self, writer: Any, added: _Added, copy: _Copy, types: _Types) -> None:
         configuration = added.configuration
         self._time = 0  # when the present message was recorded [ns]
-        self.joint_input = JointInput(lambda: self._time)
-        self.joint_input.configure(
-            configuration.chains,
-            configuration.joint_timeout,
-            velocities=configuration.publish_twist,
-        )
         self.added = dict.fromkeys(added.topics, 0)
         there = {(each.topic, each.msgtype): each for each in copy.connections.values()}
         send = {}
@@ -448,19 +476,26 @@ class _Poses:
             chain.name: Senders(
                 send[added.topic(chain, 'pose')], send.get(added.topic(chain, 'twist'))
             )
-            for chain in configuration.chains
+            for chain in added.robot.chains()
         }
-        self._stream = PoseStream(
-            configuration.chains,
-            configuration.frame_prefix,
-            senders,
-            send.get(TF_TOPIC),
+
+        def begin(chains: Sequence[Chain]) -> None:
+            self._stream = PoseStream(
+                chains, configuration.frame_prefix, senders, send.get(TF_TOPIC)
+            )
+
+        self.robot_input = RobotInput(
+            added.robot,
+            configuration.joint_timeout,
+            configuration.publish_twist,
+            begin,
         )
 
     def take(self, timestamp: int, data: bytes) -> None:
         """Take a message of joint states in, and write what it gives."""
         self._time = timestamp
-        self._stream.send(self.joint_input.feed(data))
+        vectors = self.robot_input.feed(timestamp, data)  # which may begin a new stream
+        self._stream.send(vectors)
 
     def _sender(self, writer: Any, connection: Any) -> Send:
         write = writer.write
@@ -494,15 +529,20 @@ def _run(
 
 @contextmanager
 def _open(
-    path: Path, chains: Sequence[Chain], time_unit: str
-) -> Iterator[Bag | _NoBag]:
-    """Give a recording for reading, as a bag or like one."""
-    parts = parts_without_topics(path, chains, time_unit)
-    if parts:
-        yield _NoBag(Recording(parts))
+    source: str | Path,
+    chains: Sequence[Chain] | Described,
+    joint_topics: Sequence[str],
+    time_unit: str,
+    joint_prefix: str,
+) -> Iterator[tuple[Bag | _NoBag, Robot]]:
+    """Give a recording for reading, as a bag or like one, and the robot that it is of."""
+    path = Path(source)
+    if has_topics(path):
+        with open_bag(path) as bag:
+            yield bag, robot_of(chains, [bag], joint_topics, joint_prefix)
         return
-    with open_bag(path) as bag:
-        yield bag
+    with open_recording([path], chains, joint_topics, time_unit) as recording:
+        yield _NoBag(recording), recording.robot
 
 
 def _namespace(namespace: str | None, topics: Sequence[str]) -> str:
@@ -512,9 +552,7 @@ def _namespace(namespace: str | None, topics: Sequence[str]) -> str:
         ParameterError: it is no name of ROS.
     """
     if namespace is None:
-        return os.path.commonpath([os.path.dirname(topic) for topic in topics]).rstrip(
-            '/'
-        )
+        return namespace_of(topics)
     if not _NAMESPACE.fullmatch(namespace):
         raise ParameterError(
             'namespace',
@@ -525,17 +563,20 @@ def _namespace(namespace: str | None, topics: Sequence[str]) -> str:
     return f'/{words}' if words else ''
 
 
-def _refuse_strangers(source: str | Path, look: Look, chains: Iterable[Chain]) -> None:
+def _refuse_strangers(source: str | Path, look: Look, joint_prefix: str) -> None:
     """Refuse a recording of which no joint belongs to any chain."""
     if look.joints or look.rejected.keys() - {'time_jump'}:
         return
     fault = 'has a joint of any chain' if look.messages else 'of joint states'
     wanted = '; '.join(
-        f'{chain.name} needs {", ".join(chain.joint_names)}' for chain in chains
+        f'{name} needs {", ".join(each.chain.joint_names)}'
+        for name, each in look.chains.items()
     )
+    joints = [name for each in look.chains.values() for name in each.chain.joint_names]
+    hint = name_hint(joints, look.names, joint_prefix, PREFIX_OPTION)
     raise InputFileError(
         str(source),
-        f'no message {fault}; {wanted}; names found: {names_that_came(look)}',
+        f'no message {fault}; {wanted}; names found: {names_that_came(look)}{hint}',
     )
 
 

@@ -31,6 +31,7 @@ from icub_leg_fk.tools.progress import Progress
 import yaml
 
 DEFAULT_TOPIC = '/joint_states'
+STRING = 'std_msgs/msg/String'
 METADATA = 'metadata.yaml'
 STORAGES = {'.mcap': 'mcap', '.db3': 'sqlite3'}
 
@@ -39,6 +40,10 @@ Connection = Any  # of rosbags: a topic of a recording, its type and QoS
 _MEND = {
     '.mcap': '`mcap recover` may mend it',
     '.db3': '`ros2 bag reindex` may mend it',
+}
+_BEGINNINGS = {  # of files, by which they are known
+    '.mcap': ('an MCAP file', b'\x89MCAP0\r\n'),
+    '.db3': ('an SQLite database', b'SQLite format 3\0'),
 }
 _CLEAN = re.compile(r'/?(?!/)[A-Za-z0-9._/ +@:,=-]*')  # what also sqlite takes as it is
 _MOST_METADATA = 1 << 24  # bytes
@@ -140,21 +145,17 @@ class Bag:
         Raises:
             InputFileError: there are no joint states on one of them; lists the others.
         """
-        known = self.joint_topics()
+        known = self.topics(JOINT_STATE)
         chosen = list(topics) or (known if len(known) == 1 else [DEFAULT_TOPIC])
         for topic in chosen:
             if topic not in known:
                 fault = f'no joint states on {topic}; {self.topics_of(joints)}'
                 raise InputFileError(str(self.path), fault)
-        return [
-            each
-            for each in self.connections
-            if each.topic in chosen and each.msgtype == JOINT_STATE
-        ]
+        return self.connections_of(JOINT_STATE, chosen)
 
     def topics_of(self, joints: Iterable[str]) -> str:
         """Return the topics of joint states in words, those with some joints by themselves."""
-        known = self.joint_topics()
+        known = self.topics(JOINT_STATE)
         if not known:
             return f'it has no topic of type {JOINT_STATE}'
         wanted = set(joints)
@@ -170,19 +171,27 @@ class Bag:
     def joint_names(self, topics: Collection[str]) -> tuple[str, ...]:
         """Return the joints that the first messages of some topics have."""
         names: dict[str, None] = {}
-        for each in self.connections:
-            if each.topic not in topics or each.msgtype != JOINT_STATE:
-                continue
+        for each in self.connections_of(JOINT_STATE, topics):
             for _, _, data in islice(self.messages([each]), 1):
                 with suppress(MalformedMessageError):
                     names.update(dict.fromkeys(read_layout(data).names))
         return tuple(names)
 
-    def joint_topics(self) -> list[str]:
-        """Return the topics of joint states."""
+    def topics(self, message_type: str) -> list[str]:
+        """Return the topics of a type."""
         return sorted(
-            {each.topic for each in self.connections if each.msgtype == JOINT_STATE}
+            {each.topic for each in self.connections if each.msgtype == message_type}
         )
+
+    def connections_of(
+        self, message_type: str, topics: Collection[str]
+    ) -> list[Connection]:
+        """Return those of some topics and a type."""
+        return [
+            each
+            for each in self.connections
+            if each.topic in topics and each.msgtype == message_type
+        ]
 
     def messages(
         self, connections: Iterable[Connection], progress: Progress | None = None
@@ -245,6 +254,11 @@ def new_bag(path: str | Path, storage: str, *, force: bool) -> Iterator[Any]:
         if is_file:
             (file,) = directory.glob(f'*{place.suffix}')
             file.rename(place)
+
+
+def namespace_of(topics: Iterable[str]) -> str:
+    """Return the namespace that topics share: empty, or with a slash before it."""
+    return os.path.commonpath([os.path.dirname(topic) for topic in topics]).rstrip('/')
 
 
 def reliable_qos(depth: int) -> Any:
@@ -363,8 +377,6 @@ def _reason_and_mend(directory: Path, reason: str) -> tuple[str, str]:
 
 def _refuse_other_recordings(path: Path) -> None:
     """Refuse what is no recording of ROS 2, or not all of one, where rosbags would not say so."""
-    if not path.exists():
-        raise InputFileError(str(path), 'there is no such file or directory')
     files = [path]
     if path.is_dir():
         files = sorted(entry for entry in path.iterdir() if entry.suffix in STORAGES)
@@ -379,6 +391,7 @@ def _refuse_other_recordings(path: Path) -> None:
         )
     encodings = _encodings_in_metadata(path / METADATA)
     for file in files:
+        _refuse_other_content(path, file)
         if file.suffix == '.db3':
             _refuse_waiting_messages(path, file)
         if file.suffix == '.mcap':
@@ -388,6 +401,20 @@ def _refuse_other_recordings(path: Path) -> None:
             str(path), 'is an MCAP file of ROS 1 messages; allowed: of ROS 2'
         )
     _refuse_other_than_cdr(path, encodings)
+
+
+def _refuse_other_content(path: Path, file: Path) -> None:
+    """Refuse a file that has nothing of what its name says, and which nothing mends."""
+    if file.suffix not in _BEGINNINGS:
+        return
+    kind, beginning = _BEGINNINGS[file.suffix]
+    head = first_bytes(file, len(beginning))
+    if head == beginning:
+        return
+    fault = f'is not {kind}' if head else 'is empty'
+    raise InputFileError(
+        str(path), fault if file == path else f'{file.name} in it {fault}'
+    )
 
 
 def _refuse_waiting_messages(path: Path, file: Path) -> None:

@@ -10,7 +10,7 @@ from itertools import takewhile
 import re
 from typing import Any, NoReturn
 
-from icub_leg_fk.errors import closest, LegFKError
+from icub_leg_fk.errors import closest, LegFKError, ParameterError
 
 # Python 3.14 takes the same, infinity and NaN apart; older ones take -1e-3 for an option.
 _NEGATIVE_NUMBER = re.compile(r'-(\.?\d|inf|nan)', re.IGNORECASE)
@@ -57,6 +57,14 @@ class Parser(argparse.ArgumentParser):
             return True
         known = self._option_string_actions
         return option in known or (option[1] != '-' and option[:2] in known)
+
+
+def complaint(error: Exception) -> str:
+    """Return an error as a line, in which a parameter is named as the option that sets it."""
+    line = str(error)
+    if isinstance(error, ParameterError):
+        line = f'--{error.parameter.replace("_", "-")}: {error.fault}'
+    return ' '.join(line.split())
 
 
 def _usage(actions: Sequence[argparse.Action], groups: Iterable[Any]) -> str:

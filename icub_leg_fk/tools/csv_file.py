@@ -5,7 +5,7 @@ the text may be UTF-8 or UTF-16, and Excel's `sep=;` may stand first. Times may 
 from anything else, in s, ms, us or ns. An empty cell and NaN are gaps.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 import csv
 from decimal import Decimal
 from itertools import islice, pairwise
@@ -18,6 +18,7 @@ from typing import NamedTuple
 from icub_leg_fk.errors import InputFileError
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.stream.cdr import JointStateEncoder
+from icub_leg_fk.stream.notes import name_hint
 from icub_leg_fk.tools.input_file import first_bytes, lines_of
 from icub_leg_fk.tools.joint_states import Messages, Part, SECOND
 from icub_leg_fk.tools.options import LARGEST, number
@@ -109,14 +110,8 @@ class CsvFile(Part):
     def messages(self, progress: Progress | None = None) -> Messages:
         """Yield time [ns] and CDR bytes of a JointState per row that has joint positions."""
         encoder = _RowEncoder(self._groups)
-        before = Decimal('-Infinity')
         for row in self._rows(progress):
             time = self._time_of(row)
-            if time < before:
-                raise self._fault(
-                    row, self._time, f'{time} after {before}', 'times in order'
-                )
-            before = time
             stamp = round(time * self._factor)
             if abs(stamp) >= _LAST_TIME:
                 raise self._fault(
@@ -132,7 +127,7 @@ class CsvFile(Part):
     def span(self) -> tuple[int, int]:
         """Return the first and the last time [ns]."""
         times = [self._time_of(row) for row in self._rows()]
-        return round(times[0] * self._factor), round(times[-1] * self._factor)
+        return round(min(times) * self._factor), round(max(times) * self._factor)
 
     def _rows(self, progress: Progress | None = None) -> Iterator[Row]:
         """Yield the rows after the header; empty lines and comments are none."""
@@ -291,21 +286,23 @@ class _Header:
         places = [place for place, name in enumerate(self._names) if name == joint]
         factor = 1.0
         if not places:
-            meanings = [_joint_of(name) for name in self._names]
-            places = [
-                place for place, (name, _) in enumerate(meanings) if name == joint
-            ]
-            factors = [factor for name, factor in meanings if name == joint]
-            factor = factors[0] if factors else 1.0
+            last = joint.rpartition('/')[2]
+            for place, name in enumerate(self._names):
+                meant, unit = _joint_of(name)
+                if meant == last and joint in name:
+                    places.append(place)
+                    factor = unit
         if len(places) > 1:
             raise self._twice(*(self._names[place] for place in places[:2]))
         return Column(joint, places[0], factor) if places else None
 
     def _missing(
-        self, joints: Sequence[str], chains: Sequence[Chain], found: Iterable[str]
+        self, joints: Sequence[str], chains: Sequence[Chain], found: Collection[str]
     ) -> InputFileError:
         whole = [chain.name for chain in chains if set(chain.joint_names) <= set(found)]
         advice = f'; or --chains {" ".join(whole)}' if whole else ''
+        if not found:
+            advice = name_hint(joints, self._names, '', '--joint-prefix ')
         return InputFileError(
             self._place,
             f'column {", ".join(joints)} is missing in the header '

@@ -1,14 +1,15 @@
 """What subcommands share: options by their names, and the chains and joint positions they mean."""
 
 import argparse
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 import math
+from pathlib import Path
 import sys
 from typing import Any
 
 from icub_leg_fk.errors import InputFileError, JointVectorError, LegFKError
 from icub_leg_fk.kinematics import Catalog, Chain, ChainEntry
-from icub_leg_fk.stream.configuration import LEGS
+from icub_leg_fk.stream.configuration import Configuration, DEFAULT_FRAME, LEGS
 
 LARGEST = 1e9  # of a joint position; beyond it a float's last turn is lost anyway
 
@@ -24,8 +25,24 @@ def add(parser: argparse._ActionsContainer, *names: str) -> None:
 
 def add_output(parser: argparse.ArgumentParser, purpose: str) -> None:
     """Add `--output` and `--force`."""
-    parser.add_argument('-o', '--output', metavar='FILE', help=purpose)
+    parser.add_argument('-o', '--output', metavar='FILE', type=path, help=purpose)
     add(parser, '--force')
+
+
+def add_recording(parser: argparse.ArgumentParser) -> None:
+    """Add what says which chains are looked for in recordings, and how they are read."""
+    add(
+        parser,
+        '--chains',
+        '--version',
+        '--foot-frame',
+        '--kinematics-file',
+        '--description-from-topic',
+        '--root',
+        '--joint-topic',
+        '--joint-prefix',
+        '--time-unit',
+    )
 
 
 def add_joint_positions(parser: argparse.ArgumentParser, *, required: bool) -> None:
@@ -39,6 +56,13 @@ def add_joint_positions(parser: argparse.ArgumentParser, *, required: bool) -> N
             type=_joint_position,
             help=f'joint positions in {unit}, root to tip; of a prismatic joint always in metres',
         )
+
+
+def path(text: str) -> str:
+    """Return the path that a text is; an unset variable of the shell leaves an empty one."""
+    if not text:
+        raise argparse.ArgumentTypeError("found '', allowed: a path")
+    return text
 
 
 def number(text: str) -> float:
@@ -101,16 +125,23 @@ def chains_of_one_root(args: argparse.Namespace) -> list[Chain]:
     """
     catalog = load_catalog(args)
     legs = [name for name in LEGS if name in catalog.chains]
-    chains = catalog.select(args.chains or legs or catalog.chains, args.version)
+    configuration = Configuration.checked(
+        catalog,
+        chains=args.chains or legs or list(catalog.chains),
+        version=args.version or '',
+        joint_prefix=getattr(args, 'joint_prefix', ''),
+        foot_frame=args.foot_frame or DEFAULT_FRAME,
+    )
+    chains = configuration.chains
     roots = sorted({chain.root_frame for chain in chains})
     if len(roots) > 1:
         raise LegFKError(
             f'the chains have the root frames {", ".join(roots)}; allowed: chains of '
             'one root frame'
         )
-    if not args.foot_frame:
-        return list(chains)
-    return _in_frame(chains, args.foot_frame)
+    if args.foot_frame:
+        print_notes([], configuration.notes)
+    return list(chains)
 
 
 def print_notes(warnings: Iterable[str], notes: Iterable[str]) -> None:
@@ -119,21 +150,6 @@ def print_notes(warnings: Iterable[str], notes: Iterable[str]) -> None:
         print(f'leg_fk: warning: {warning}', file=sys.stderr)
     for note in notes:
         print(f'leg_fk: note: {note}', file=sys.stderr)
-
-
-def _in_frame(chains: Sequence[Chain], frame: str) -> list[Chain]:
-    """Return chains in a frame that at least one of them has, with a line on those without it."""
-    if not any(frame in chain.tip_frames for chain in chains):
-        return [chain.with_frame(frame) for chain in chains]  # which says what there is
-    framed = []
-    for chain in chains:
-        if frame in chain.tip_frames:
-            framed.append(chain.with_frame(frame))
-        else:
-            framed.append(chain)
-            note = f'{chain.name} has no {frame} frame; its pose is that of {chain.frame_id}'
-            print_notes([], [note])
-    return framed
 
 
 def joint_positions(args: argparse.Namespace, chain: Chain) -> list[float] | None:
@@ -163,6 +179,15 @@ def _joint_position(text: str) -> float:
             'their decimals by a point'
         )
     return _position_in_bounds(text)
+
+
+def _topic(text: str) -> str:
+    if not text.startswith('/') or Path(text).exists():
+        raise argparse.ArgumentTypeError(
+            f'found {text!r}, allowed: a topic with a slash before it; what is to be read '
+            'comes before this option'
+        )
+    return text
 
 
 _position_in_bounds = number_between(
@@ -262,6 +287,20 @@ _OPTIONS: dict[str, dict[str, Any]] = {
         'help': "the bag's topics of joint states (default: /joint_states, or the only one there "
         'is)',
     },
+    '--joint-prefix': {
+        'metavar': 'PREFIX',
+        'default': '',
+        'help': 'put before every joint name that is looked for, such as icub1/',
+    },
+    '--description-from-topic': {
+        'metavar': 'TOPIC',
+        'nargs': '?',
+        'const': True,
+        'default': False,
+        'type': _topic,
+        'help': "compute with the robot's own URDF, which a bag has (default TOPIC: "
+        'robot_description, in the namespace of the joint states)',
+    },
     '--time-unit': {
         'metavar': '{s,ms,us,ns}',
         'choices': ('s', 'ms', 'us', 'ns'),
@@ -273,6 +312,12 @@ _OPTIONS: dict[str, dict[str, Any]] = {
         'metavar': 'FILE',
         'help': 'a kinematics file, with the DH tables of any robot, or a URDF (default: the '
         'tables of the iCub, as shipped)',
+    },
+    'recordings': {
+        'metavar': 'RECORDING',
+        'nargs': '+',
+        'type': path,
+        'help': 'bag, CSV file or directory of yarpdatadumper',
     },
     '--root': {
         'metavar': 'LINK',

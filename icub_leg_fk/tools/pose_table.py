@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 import shutil
@@ -46,7 +46,6 @@ class PoseTable:
     def __init__(self, chains: Sequence[Chain], twist: bool, sink: Sink) -> None:
         self.counts = {chain.name: 0 for chain in chains}
         self.rows = 0
-        self._chains = chains
         self._width = len(_quantities(twist))
         self._waiting: dict[int, _Row] = {}  # by their times
         self._done: list[tuple[int, _Row]] = []
@@ -87,17 +86,17 @@ class PoseTable:
         """Write the rows that are done."""
         stamps = np.array([stamp for stamp, _ in self._done], dtype=np.int64)
         rows = [row for _, row in self._done]
-        values = np.full((len(rows), len(self._chains), self._width), np.nan)
-        for i, chain in enumerate(self._chains):
-            there = [place for place, row in enumerate(rows) if chain.name in row]
-            if there:
-                vectors = [rows[place][chain.name] for place in there]
-                values[there, i] = self._values(chain, vectors)
+        values = np.full((len(rows), len(self.counts), self._width), np.nan)
+        for i, name in enumerate(self.counts):
+            for there in _places(rows, name):
+                vectors = [rows[place][name] for place in there]
+                values[there, i] = self._values(vectors)
         self._sink.write(stamps, values.reshape(len(rows), -1))
         self._done.clear()
 
-    def _values(self, chain: Chain, vectors: Sequence[Ready]) -> Array:
-        """Return the (N, 7) poses, or (N, 13) poses and twists, of N joint vectors."""
+    def _values(self, vectors: Sequence[Ready]) -> Array:
+        """Return the (N, 7) poses, or (N, 13) poses and twists, of a chain's N joint vectors."""
+        chain = vectors[0].chain
         poses = chain.poses(np.array([ready.positions for ready in vectors]))
         if self._width == poses.shape[1]:
             return poses
@@ -106,6 +105,15 @@ class PoseTable:
             if ready.velocities is not None:
                 twist[:] = chain.twist(ready.positions, ready.velocities)
         return np.hstack([poses, twists])
+
+
+def _places(rows: Sequence[_Row], name: str) -> Iterable[list[int]]:
+    """Return the rows that have a chain of some name, by themselves those of each description."""
+    places: dict[int, list[int]] = {}
+    for place, row in enumerate(rows):
+        if name in row:
+            places.setdefault(id(row[name].chain), []).append(place)
+    return places.values()
 
 
 class CsvTable:

@@ -9,6 +9,7 @@ from array import array
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager, ExitStack
 from dataclasses import dataclass
+import errno
 import heapq
 from operator import itemgetter
 from pathlib import Path
@@ -18,7 +19,7 @@ from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.stream.cdr import JOINT_STATE
 from icub_leg_fk.stream.configuration import DEFAULT_TIMEOUT
-from icub_leg_fk.stream.joint_input import JointInput, Look, Ready
+from icub_leg_fk.stream.joint_input import Look, Ready
 from icub_leg_fk.stream.notes import notes_of
 from icub_leg_fk.tools import csv_file
 from icub_leg_fk.tools.bags import (
@@ -33,6 +34,13 @@ from icub_leg_fk.tools.bags import (
 from icub_leg_fk.tools.csv_file import CsvFile
 from icub_leg_fk.tools.joint_states import Messages, Part, SECOND
 from icub_leg_fk.tools.progress import Progress
+from icub_leg_fk.tools.recorded_robot import (
+    Described,
+    OPTION,
+    Robot,
+    robot_of,
+    RobotInput,
+)
 from icub_leg_fk.tools.yarp_log import DATA, is_yarp_log, PARTS, YarpLog
 import numpy as np
 
@@ -40,6 +48,8 @@ KINDS = (
     'a bag (directory, .mcap or .db3), a CSV file (.csv, .tsv or .txt) or a directory of '
     'yarpdatadumper'
 )
+
+PREFIX_OPTION = '--joint-prefix '
 
 _OF_ROS_1 = '.bag'
 _COMPRESSED = '.zstd'
@@ -77,7 +87,9 @@ class BagTopics(Part):
 
     def topics_with(self, joints: Collection[str]) -> list[str]:
         """Return the other topics of the bag that have some joints."""
-        others = [name for name in self._bag.joint_topics() if name not in self._topics]
+        others = [
+            name for name in self._bag.topics(JOINT_STATE) if name not in self._topics
+        ]
         return [
             name for name in others if set(joints) & set(self._bag.joint_names([name]))
         ]
@@ -90,15 +102,21 @@ class Recording:
         name: its paths.
         topic: topics of the joint states; empty if it has no topics.
         start: time that is called 0 [ns]; None if that is the first pose.
+        robot: whose joints they are.
+        joint_prefix: what is before the joint names of its chains.
         notes: what a user should know of it, one line each.
     """
 
-    def __init__(self, parts: Sequence[Part]) -> None:
+    def __init__(
+        self, parts: Sequence[Part], robot: Robot, joint_prefix: str = ''
+    ) -> None:
         self._parts = parts
+        self.robot = robot
+        self.joint_prefix = joint_prefix
         self.name = ', '.join(str(part.path) for part in parts)
         self.topic = ' and '.join(part.topic for part in parts if part.topic)
         self.start = 0 if all(part.is_relative for part in parts) else None
-        self.notes = [note for part in parts for note in part.notes]
+        self.notes = [note for part in parts for note in part.notes] + robot.notes
         if len(parts) > 1:
             _refuse_shared_joints(parts)
             _refuse_separate_spans(parts)
@@ -131,42 +149,62 @@ class Recording:
 @contextmanager
 def open_recording(
     paths: Sequence[str | Path],
-    chains: Sequence[Chain],
+    chains: Sequence[Chain] | Described,
     topics: Sequence[str] = (),
     time_unit: str = '',
+    joint_prefix: str = '',
 ) -> Iterator[Recording]:
     """Give a recording for reading.
 
     Args:
         paths: where its parts are: bags, CSV files, directories of yarpdatadumper or with some.
-        chains: the chains whose joints are looked for.
+        chains: the chains whose joints are looked for, or how those of the recording's own
+            description of the robot are chosen.
         topics: topics of joint states in bags; `/joint_states`, or the only one there is, if none
             is named.
         time_unit: unit of the times in CSV files; if empty it is told by their size, or by the
             header.
+        joint_prefix: what is before the joint names of the chains.
 
     Raises:
-        InputFileError: a part cannot be read, or does not go with another.
-        LegFKError: topics are named, and no part is a bag.
+        InputFileError: a part cannot be read, or does not go with another; or it has no
+            description that can be used.
+        LegFKError: topics are named, or a description is wanted, and no part is a bag.
     """
-    joints = list(dict.fromkeys(name for chain in chains for name in chain.joint_names))
+    places = [Path(path) for path in paths]
     with ExitStack() as stack:
+        bags = {
+            path: stack.enter_context(open_bag(path))
+            for path in places
+            if has_topics(path)
+        }
+        refuse_topics(places[0], chains, topics, bags)
+        robot = robot_of(chains, list(bags.values()), topics, joint_prefix)
+        chains = robot.periods[0].chains
+        names = dict.fromkeys(name for chain in chains for name in chain.joint_names)
         parts: list[Part] = []
-        for path in map(Path, paths):
-            without_topics = parts_without_topics(path, chains, time_unit)
-            if without_topics:
-                parts += without_topics
+        for path in places:
+            if path in bags:
+                parts.append(BagTopics(bags[path], topics, list(names)))
             else:
-                bag = stack.enter_context(open_bag(path))
-                parts.append(BagTopics(bag, topics, joints))
-        if topics and not any(part.topic for part in parts):
-            raise LegFKError(f'--joint-topic: {parts[0].path} has no topics')
-        yield Recording(parts)
+                parts += parts_without_topics(path, chains, time_unit)
+        yield Recording(parts, robot, joint_prefix)
+
+
+def refuse_topics(
+    path: Path,
+    chains: Sequence[Chain] | Described,
+    topics: Sequence[str],
+    bags: Collection[object],
+) -> None:
+    """Refuse what only bags have, if there are no bags."""
+    option = OPTION if isinstance(chains, Described) else '--joint-topic'
+    if not bags and (topics or option == OPTION):
+        raise LegFKError(f'{option}: {path} has no topics')
 
 
 def follow(
     recording: Recording,
-    chains: Sequence[Chain],
     take: Callable[[list[Ready]], None],
     *,
     joint_timeout: float = DEFAULT_TIMEOUT,
@@ -177,20 +215,17 @@ def follow(
 
     Args:
         recording: the recording.
-        chains: the chains.
         take: takes what each message makes ready.
         joint_timeout: how far a joint may lag the newest of its chain [s]; 0 is any time.
         velocities: whether velocities are wanted.
         progress: called now and then with the share that is done, 0 to 1.
     """
-    now = 0
-    joint_input = JointInput(lambda: now)
-    joint_input.configure(chains, joint_timeout, velocities)
-    for now, data in recording.messages(progress):  # noqa: B007 (a message without stamp has it)
-        ready = joint_input.feed(data)
+    robot_input = RobotInput(recording.robot, joint_timeout, velocities)
+    for now, data in recording.messages(progress):
+        ready = robot_input.feed(now, data)
         if ready:
             take(ready)
-    return joint_input.take_look()
+    return robot_input.take_look()
 
 
 def warnings_of(
@@ -206,9 +241,9 @@ def warnings_of(
     Raises:
         InputFileError: no chain has a pose; says why.
     """
-    notes = notes_of(look, recording.topic)
+    notes = notes_of(look, recording.topic, recording.joint_prefix, PREFIX_OPTION)
     others = ' '.join(name for name in look.chains if name not in poseless)
-    lines = []
+    lines = list(recording.robot.warnings)
     for note in notes:
         line = str(note)
         if note.chain in poseless:
@@ -268,7 +303,7 @@ def read_joints(paths: Sequence[str | Path], chains: Sequence[Chain]) -> JointRe
                 positions.extend(ready.positions)
 
     with open_recording(paths, chains) as recording:
-        look = follow(recording, chains, take)
+        look = follow(recording, take)
         warnings_of(recording, look, list(look.chains) if not stamps else [])
     times = np.frombuffer(stamps, dtype=np.int64)
     start = times[0] if recording.start is None else recording.start
@@ -292,36 +327,57 @@ def write_joint_states(
             writer.write(topic, stamp, data)
 
 
+def has_topics(path: Path) -> bool:
+    """Return whether a recording is a bag, rather than a CSV file or logs of YARP.
+
+    Raises:
+        InputFileError: there is nothing, or something else.
+    """
+    try:
+        path.stat()
+    except OSError as error:
+        faults = {
+            errno.ENOENT: f'there is no such file or directory; allowed: {KINDS}',
+            errno.ELOOP: 'is a loop of links, which lead to no file',
+        }
+        fault = f'cannot be read: {str(error.strerror).lower()}'
+        raise InputFileError(str(path), faults.get(error.errno or 0, fault)) from error
+    if _is_csv(path) or _log_folders(path):
+        return False
+    _refuse_other_files(path)
+    return True
+
+
 def parts_without_topics(
     path: Path, chains: Sequence[Chain], time_unit: str
 ) -> list[Part]:
-    """Return the CSV file or the logs of YARP at a path; nothing if there is a bag.
+    """Return the CSV file or the logs of YARP at a path.
 
     Raises:
-        InputFileError: there is nothing, or something else, or they cannot be read.
+        InputFileError: they cannot be read.
     """
-    if not path.exists():
-        fault = f'there is no such file or directory; allowed: {KINDS}'
-        raise InputFileError(str(path), fault)
-    if path.is_file() and path.suffix.lower() in csv_file.ENDINGS:
+    if _is_csv(path):
         return [CsvFile(path, chains, time_unit)]
-    logs = _yarp_logs(path)
-    if not logs:
-        _refuse_other_files(path)
-    return logs
+    return _yarp_logs(path)
 
 
-def _yarp_logs(path: Path) -> list[Part]:
-    """Return the logs of YARP that a path is, or that stand in it; none if it is something else.
+def _is_csv(path: Path) -> bool:
+    return path.is_file() and path.suffix.lower() in csv_file.ENDINGS
 
-    Those of parts whose joints are not known are left out, with a note.
-    """
+
+def _log_folders(path: Path) -> list[Path]:
+    """Return the logs of YARP that a path is, or that stand in it; none if it is no such."""
     if path.name == DATA and path.is_file():
         path = path.parent
     folders = [path]
     if path.is_dir() and not is_yarp_log(path) and not (path / METADATA).exists():
         folders = sorted(path.iterdir())
-    logs = [YarpLog(folder) for folder in folders if is_yarp_log(folder)]
+    return [folder for folder in folders if is_yarp_log(folder)]
+
+
+def _yarp_logs(path: Path) -> list[Part]:
+    """Return the logs of YARP at a path; those of parts whose joints are not known are noted."""
+    logs = [YarpLog(folder) for folder in _log_folders(path)]
     known = [log for log in logs if log.joint_names]
     ports = ', '.join(log.port for log in logs if not log.joint_names)
     if ports and not known:

@@ -15,6 +15,7 @@ from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.stream.joint_input import Ready
 from icub_leg_fk.tools.joint_states import SECOND
 from icub_leg_fk.tools.progress import Progress
+from icub_leg_fk.tools.recorded_robot import Described
 from icub_leg_fk.tools.recording import follow, open_recording, warnings_of
 import numpy as np
 from numpy.typing import NDArray
@@ -92,7 +93,7 @@ class Reading(NamedTuple):
     """What chains did in a recording.
 
     Attributes:
-        tracks: of the chains that have a pose.
+        tracks: of the chains that have a pose; several of one whose description changes.
         warnings: what is doubtful, one line each.
         notes: what else a user should know, one line each.
     """
@@ -104,11 +105,12 @@ class Reading(NamedTuple):
 
 def read_tracks(
     paths: Sequence[str | Path],
-    chains: Sequence[Chain],
+    chains: Sequence[Chain] | Described,
     topics: Sequence[str] = (),
     progress: Progress | None = None,
     *,
     time_unit: str = '',
+    joint_prefix: str = '',
     begin: float | None = None,
     end: float | None = None,
 ) -> Reading:
@@ -119,10 +121,11 @@ def read_tracks(
 
     Args:
         paths: where the parts of the recording are, see `open_recording`.
-        chains: the chains.
+        chains: the chains, or how those of the recording's own description are chosen.
         topics: topics of the joint states in bags.
         progress: called now and then with the share that is done, 0 to 1.
         time_unit: unit of the times in CSV files.
+        joint_prefix: what is before the joint names of the chains.
         begin: time of the first pose that is wanted [s]; None for the first there is.
         end: time of the last [s]; None for the last there is.
 
@@ -130,14 +133,17 @@ def read_tracks(
         InputFileError: it cannot be read, or no chain has a pose.
         LegFKError: a chain has poses, but none at the times that are wanted.
     """
-    with open_recording(paths, chains, topics, time_unit) as recording:
-        traces = _Traces(chains, recording.start, begin, end)
-        look = follow(recording, chains, traces.take, progress=progress)
+    with open_recording(paths, chains, topics, time_unit, joint_prefix) as recording:
+        traces = _Traces(recording.start, begin, end)
+        look = follow(recording, traces.take, progress=progress)
         poseless = [
             name for name, of_chain in look.chains.items() if not of_chain.ready
         ]
         warnings = warnings_of(recording, look, poseless)
-    tracks = [traces.track(chain) for chain in chains if chain.name not in poseless]
+    tracks: list[ChainTrack] = []
+    for name in look.chains:
+        if name not in poseless:
+            tracks += traces.tracks(name)
     return Reading(tracks, warnings, recording.notes)
 
 
@@ -169,13 +175,9 @@ class _Traces:
     """Takes joint vectors, and gives what each chain did."""
 
     def __init__(
-        self,
-        chains: Sequence[Chain],
-        start: int | None,
-        begin: float | None,
-        end: float | None,
+        self, start: int | None, begin: float | None, end: float | None
     ) -> None:
-        self._traces = {chain.name: _Trace(chain) for chain in chains}
+        self._traces: dict[str, list[_Trace]] = {}  # by the names of the chains
         self._start = start
         self._first = -math.inf if begin is None else begin * SECOND
         self._last = math.inf if end is None else end * SECOND
@@ -191,16 +193,18 @@ class _Traces:
             first, last = self._span
             self._span = (min(first, since), max(last, since))
             if self._first <= since <= self._last:
-                self._traces[ready.chain.name].add(stamp, ready.positions)
+                traces = self._traces.setdefault(ready.chain.name, [])
+                if not traces or traces[-1].chain is not ready.chain:
+                    traces.append(_Trace(ready.chain))
+                traces[-1].add(stamp, ready.positions)
 
-    def track(self, chain: Chain) -> ChainTrack:
-        """Return what one chain did.
+    def tracks(self, name: str) -> list[ChainTrack]:
+        """Return what a chain did: one track, or one for each of its descriptions.
 
         Raises:
             LegFKError: it has no pose at the times that are wanted.
         """
-        trace = self._traces[chain.name]
-        if not trace.stamps:
+        if name not in self._traces:
             first, last = (time / SECOND for time in self._span)
             begin = max(self._first / SECOND, first)
             end = min(self._last / SECOND, last)
@@ -209,19 +213,20 @@ class _Traces:
                 f'pose; the recording goes from {first:g} to {last:g} s'
             )
         assert self._start is not None
-        return trace.track(self._start)
+        return [trace.track(self._start) for trace in self._traces[name]]
 
 
 class _Trace:
     """Takes the samples of one chain, and keeps as many rows of them as can be drawn.
 
     Attributes:
+        chain: the chain.
         stamps: times of all samples [ns].
     """
 
     def __init__(self, chain: Chain) -> None:
         self.stamps = array('q')
-        self._chain = chain
+        self.chain = chain
         self._waiting = array('d')  # positions of samples that are in no row yet
         self._rows: list[Array] = []
         self._size = 1  # samples of a row
@@ -233,13 +238,13 @@ class _Trace:
         """Take a sample: time [ns] and n joint positions."""
         self.stamps.append(stamp)
         self._waiting.extend(positions)
-        if len(self._waiting) == _BLOCK * self._chain.n:
+        if len(self._waiting) == _BLOCK * self.chain.n:
             self._keep_waiting()
 
     def extend(self, stamps: NDArray[np.int64], Q: Array, poses: Array | None) -> None:
         """Take (N,) times [ns], (N, n) joint positions and (N, 7) poses, if they are known."""
         self.stamps.extend(stamps.tolist())
-        poses = self._chain.poses(Q) if poses is None else poses
+        poses = self.chain.poses(Q) if poses is None else poses
         for start in range(0, len(Q), _BLOCK):
             rows = slice(start, start + _BLOCK)
             self._keep(Q[rows], poses[rows])
@@ -248,7 +253,7 @@ class _Trace:
         """Return what the chain did, in times since a start [ns]."""
         self._keep_waiting()
         rows = np.concatenate(self._rows)
-        n = self._chain.n
+        n = self.chain.n
         stamps = np.frombuffer(self.stamps, dtype=np.int64)
         after = _breaks(stamps)  # samples, of which some may be within a row
         breaks = np.unique(-(-after // self._size))
@@ -258,7 +263,7 @@ class _Trace:
             if last > first:
                 gaps.append((first, last))
         return ChainTrack(
-            chain=self._chain,
+            chain=self.chain,
             count=len(stamps),
             times=(stamps[:: self._size] - start) / SECOND,
             positions=rows[:, :n],
@@ -272,13 +277,13 @@ class _Trace:
 
     def _keep_waiting(self) -> None:
         if self._waiting:
-            Q = np.frombuffer(self._waiting).reshape(-1, self._chain.n)
+            Q = np.frombuffer(self._waiting).reshape(-1, self.chain.n)
             self._waiting = array('d')
-            self._keep(Q, self._chain.poses(Q))
+            self._keep(Q, self.chain.poses(Q))
 
     def _keep(self, Q: Array, poses: Array) -> None:
         """Keep rows of a block of samples; where there are too many, each two become one."""
-        is_outside = np.hstack([Q < self._chain.lower, Q > self._chain.upper])
+        is_outside = np.hstack([Q < self.chain.lower, Q > self.chain.upper])
         self._outside.append(np.packbits(is_outside, axis=0))
         coordinates = np.hstack([poses[:, :3], self._turns(poses[:, 3:])])
         samples = np.hstack([Q, poses, coordinates, coordinates])
@@ -302,13 +307,13 @@ class _Trace:
         bits = np.concatenate(self._outside)
         found = []
         for place in np.flatnonzero(bits.any(axis=0)).tolist():
-            joint = place % self._chain.n
-            is_above = place >= self._chain.n
+            joint = place % self.chain.n
+            is_above = place >= self.chain.n
             is_outside = np.unpackbits(bits[:, place], count=len(stamps)).astype(bool)
             ends = np.flatnonzero(np.diff(is_outside, prepend=False, append=False))
             times = _seconds(stamps[np.minimum(ends, len(stamps) - 1)], start)
             spans = list(zip(times[::2], times[1::2]))
-            found.append(OutOfRange(self._chain, joint, is_above, spans))
+            found.append(OutOfRange(self.chain, joint, is_above, spans))
         return sorted(found, key=lambda each: (each.joint, each.is_above))
 
 

@@ -657,10 +657,11 @@ def test_of_killed_recorders_the_sqlite_file_is_taken_and_the_mcap_file_explaine
         f'alone, or let `ros2 bag reindex {file.parent}` write one',
     )
     killed = RECORDINGS / 'mcap_killed'
-    refused(tmp_path, killed, '`mcap recover` mends its file')
-    refused(
-        tmp_path, killed / 'mcap_killed_0.mcap', 'to be empty; `mcap recover` may mend'
-    )
+    refused(tmp_path, killed, 'mcap_killed: mcap_killed_0.mcap in it is empty')
+    refused(tmp_path, killed / 'mcap_killed_0.mcap', '_0.mcap: is empty')
+    write_bag(tmp_path / 'in', joints=walk(5))
+    (tmp_path / 'in' / 'metadata.yaml').unlink()
+    refused(tmp_path, tmp_path / 'in', '`mcap recover` mends its file')
 
 
 def test_what_is_no_recording_of_ros_2_is_called_by_its_name(tmp_path):
@@ -694,10 +695,15 @@ def test_damage_and_missing_files_end_in_one_line_with_what_mends_them(
     source = write_bag(tmp_path / 'in', storage, walk(800))
     file = source / f'in{ENDINGS[storage]}'
     data = file.read_bytes()
-    for spoilt in (data[: len(data) // 2], data[:20], b'', b'x' * 5000):
+    for spoilt, words in (
+        (data[: len(data) // 2], mend),
+        (data[:20], mend),
+        (b'', 'is empty'),
+        (b'x' * 5000, 'is not an '),
+    ):
         file.write_bytes(spoilt)
-        refused(tmp_path, source, mend)
-        refused(tmp_path, file, mend)
+        refused(tmp_path, source, words)
+        refused(tmp_path, file, words)
     file.unlink()
     refused(tmp_path, source, 'files are missing')
     refused(tmp_path, file, 'there is no such file or directory')

@@ -13,7 +13,7 @@ from icub_leg_fk.commands.plot import default_instants
 from icub_leg_fk.kinematics import Catalog, config_file, load_chain
 from icub_leg_fk.tools import drawing
 from icub_leg_fk.tools.recording import read_joints
-from icub_leg_fk.tools.tracks import track_of
+from icub_leg_fk.tools.tracks import read_tracks, track_of
 import numpy as np
 import pytest
 from support.leg_fk_process import assert_one_line_complaint, leg_fk, run_main
@@ -297,6 +297,9 @@ def test_failed_picture_leaves_nothing_behind(walking_csv, monkeypatch):
     ('words', 'named'),
     [
         (['nowhere.csv'], ['nowhere.csv']),
+        ([''], ["argument RECORDING: found ''"]),
+        (['walking.csv', '-o', ''], ["found ''"]),
+        (['loop'], ['loop: is a loop of links']),
         (['walking.csv', '-o', 'feet.bmp'], ['.bmp', '.png, .svg, .pdf']),
         (['walking.csv', '-o', 'none/feet.png'], ['none/feet.png', 'directory']),
         (['walking.csv', '-o', '-'], ['-: is standard output']),
@@ -327,7 +330,6 @@ def test_failed_picture_leaves_nothing_behind(walking_csv, monkeypatch):
         (['short.csv'], ['short.csv:6', '12 values under 14 columns']),
         (['long.csv'], ['long.csv:6', '15 values under 14 columns']),
         (['huge.csv'], ['huge.csv:7', 'column r_hip_roll', "'1e300'", 'up to 1e+09']),
-        (['unsorted.csv'], ['unsorted.csv:8', 'column time', '0.050 after 0.060']),
         (['binary.csv'], ['binary.csv', 'no column of times']),
         (['broken.mcap'], ['broken.mcap', 'read']),
         (['emptydir'], ['emptydir', 'bag']),
@@ -371,11 +373,11 @@ def spoil(good):
     write('short', columns, [*rows[:4], rows[4][:12], *rows[5:]])
     write('long', columns, [*rows[:4], [*rows[4], 1], *rows[5:]])
     write('huge', edited(7, 'r_hip_roll', '1e300'))
-    write('unsorted', columns, [*rows[:5], rows[6], rows[5], *rows[7:]])
     Path('empty.csv').touch()
     Path('binary.csv').write_bytes(b'\xff\xfe\x00\x01' * 100)
     Path('broken.mcap').write_bytes(b'\x89MCAP0\r\n' + b'nothing' * 9)
     Path('emptydir').mkdir()
+    Path('loop').symlink_to('loop')
 
 
 def test_bag_without_joint_states_lists_what_it_has(tmp_path, monkeypatch):
@@ -605,8 +607,13 @@ def test_a_clock_that_steps_back_is_reported(tmp_path, monkeypatch):
             for i, stamp in enumerate(stamps)
         ],
     )
-    _, errors = plotted('bag')
-    assert 'time stepped back to 10.100 s' in errors
+    rows = [[stamp / 1e9, *[0.01 * (i + 1) for i in range(12)]] for stamp in stamps]
+    write_csv('walk.csv', ['time', *JOINTS], rows)
+    for source in ('bag', 'walk.csv'):
+        _, errors = plotted(source)
+        assert 'time stepped back to 10.100 s' in errors
+        for track in read_tracks([source], LEGS).tracks:
+            assert (track.count, track.breaks.tolist()) == (100, [50])
 
 
 def test_chains_of_several_roots_are_refused(tmp_path, monkeypatch):
