@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from contextlib import closing
 import os
 from pathlib import Path
 import sys
@@ -21,6 +20,7 @@ from icub_leg_fk.tools.drawing import check_output, feet_figure, save_picture
 from icub_leg_fk.tools.output_file import check_target, is_bag
 from icub_leg_fk.tools.recording import JointRecording
 from icub_leg_fk.tools.replay import Answers, Replay
+from icub_leg_fk.tools.ros import running_ros
 from icub_leg_fk.tools.terminal import import_rich
 from icub_leg_fk.tools.tracks import ChainTrack, track_of
 import numpy as np
@@ -64,12 +64,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help='keep the joint states as a rosbag2 bag',
     )
-    options.add(parser, '--version', '--foot-frame')
+    options.add(parser, '--version', '--foot-frame', '--kinematics-file')
     options.add_output(
         parser,
         'picture to write, .png, .svg or .pdf (default: demo.png, which is replaced)',
     )
-    parser.set_defaults(kinematics_file=None)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -83,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
     chains = _legs(options.load_catalog(args), args)
     recording = _recording(args, chains)
     try:
-        replay, is_whole = _play(recording, chains)
+        replay, is_whole = _play(recording, chains, args.kinematics_file)
     except replays.DemoError as error:
         print(f'leg_fk: error: {error}', file=sys.stderr)
         return 1
@@ -119,13 +118,14 @@ def _recording(args: argparse.Namespace, chains: Sequence[Chain]) -> JointRecord
     return recording if args.seconds is None else recording.first(args.seconds)
 
 
-def _play(recording: JointRecording, chains: Sequence[Chain]) -> tuple[Replay, bool]:
+def _play(
+    recording: JointRecording, chains: Sequence[Chain], file: str | None
+) -> tuple[Replay, bool]:
     """Play the recording to the node; return what came of it, and whether it was whole."""
     domain = replays.stay_on_this_machine()
     namespace = f'/leg_fk_demo_{os.getpid()}'
-    version, frame = chains[0].version, chains[0].frame
     print(
-        f'iCub legs {version}: {len(recording.times)} JointState messages to '
+        f'iCub legs {chains[0].version}: {len(recording.times)} JointState messages to '
         'foot_pose_publisher, poses back over DDS'
     )
     print(
@@ -133,13 +133,17 @@ def _play(recording: JointRecording, chains: Sequence[Chain]) -> tuple[Replay, b
         flush=True,
     )
     tips = [chain.tip for chain in chains]
-    parameters = {'version': version, 'foot_frame': frame}
+    names = [f'{chain.name}={chain.version}' for chain in chains]
+    parameters = {'chains': f'[{", ".join(names)}]', 'foot_frame': chains[0].frame}
+    if file:
+        parameters['kinematics_file'] = os.path.abspath(file)
     parameters |= replays.lossless(namespace, tips, replays.DEPTH)
     seconds = float(recording.times[-1] - recording.times[0])
     with (
-        closing(Replay(recording, namespace, tips)) as replay,
+        running_ros('the demonstration', 'leg_fk_demo', namespace) as ros,
         replays.running_node(namespace, parameters) as (_, check),
     ):
+        replay = Replay(ros, recording, tips)
         display = Display(replay.answers, seconds, chains[0].root_frame)
         replay.wait_for_node(check)
         try:

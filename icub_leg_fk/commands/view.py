@@ -13,11 +13,12 @@ from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.tools import options
 from icub_leg_fk.tools.progress import shown_progress
 from icub_leg_fk.tools.tracks import read_tracks
-from icub_leg_fk.tools.viewer import Source, Viewer
-from icub_leg_fk.tools.viewer_live import DEFAULT_TOPIC, live_joints
+from icub_leg_fk.tools.viewer import Viewer
+from icub_leg_fk.tools.viewer_live import live_robot, Select
 from icub_leg_fk.tools.viewer_page import running_server
-from icub_leg_fk.tools.viewer_recording import RecordedChain, Recording
+from icub_leg_fk.tools.viewer_recording import Recording
 from icub_leg_fk.tools.viewer_scene import axis_names
+from icub_leg_fk.tools.viewer_source import Source
 
 EXAMPLES = """\
 A slider per joint moves the chains; a click on a pose selects it, to be copied. The tab Method
@@ -29,6 +30,7 @@ examples:
   leg_fk view left_leg=v1 --foot-frame sole
   leg_fk view arm -k my_robot.yaml
   leg_fk view --recording walking.csv
+  leg_fk view head_imu --recording dump/torso dump/head
   leg_fk view --live"""
 
 _HIGHEST_PORT = 64535  # viser tries the next thousand, too
@@ -48,20 +50,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     source.add_argument(
         '--recording',
         metavar='FILE',
-        type=Path,
-        help='play a bag, a CSV file or a log of YARP',
+        nargs='+',
+        help='play bags, CSV files or logs of YARP; several are parts of one robot',
     )
     source.add_argument(
         '--live',
         action='store_true',
-        help='follow the joint states of a running robot (needs ROS 2)',
+        help='follow the joint states of a running robot, and its description unless '
+        '-k or a version is given (needs ROS 2)',
     )
-    parser.add_argument(
-        '--joint-topic',
-        metavar='TOPIC',
-        help="topic of joint states: the recording's (default: /joint_states, or "
-        f"the only one there is) or the robot's (default: {DEFAULT_TOPIC})",
-    )
+    options.add(parser, '--joint-topic', '--time-unit')
     parser.add_argument(
         '--host',
         metavar='ADDRESS',
@@ -82,36 +80,44 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Show the page until a signal ends it."""
-    if args.joint_topic is not None and not (args.recording or args.live):
+    if args.joint_topics and not (args.recording or args.live):
         raise LegFKError('--joint-topic goes with --recording or --live')
-    chains = options.chains_of_one_root(args)
+    chains: Sequence[Chain] = options.chains_of_one_root(args)
     with ExitStack() as stack:
         server = stack.enter_context(running_server(args.host, args.port))
         source: Source | None = None
         if args.recording:
-            chains, source = _recording(args.recording, chains, args.joint_topic)
+            source = _recording(args, chains)
+            chains = source.chains
         elif args.live:
-            topic = args.joint_topic or DEFAULT_TOPIC
-            source = stack.enter_context(live_joints(chains, topic))
+            robot = live_robot(chains, args.joint_topics, _select(args))
+            source = stack.enter_context(robot)
         viewer = Viewer(server, chains, source)
         _announce(chains, args, server.get_port())
         viewer.run()
     return 0
 
 
-def _recording(
-    path: Path, chains: Sequence[Chain], topic: str | None
-) -> tuple[list[Chain], Recording]:
-    """Return the chains that a recording moves, and the recording."""
-    topics = [] if topic is None else [topic]
-    with shown_progress(path.name) as progress:
-        reading = read_tracks([path], chains, topics, progress)
+def _recording(args: argparse.Namespace, chains: Sequence[Chain]) -> Recording:
+    """Return the recording, with the chains that it moves."""
+    with shown_progress(Path(args.recording[0]).name) as progress:
+        reading = read_tracks(
+            args.recording,
+            chains,
+            args.joint_topics,
+            progress,
+            time_unit=args.time_unit,
+        )
     options.print_notes(reading.warnings, reading.notes)
-    recorded = [
-        RecordedChain(track.chain, track.times, track.positions)
-        for track in reading.tracks
-    ]
-    return [track.chain for track in reading.tracks], Recording(recorded)
+    return Recording(reading.tracks)
+
+
+def _select(args: argparse.Namespace) -> Select | None:
+    """Return what selects the chains of a description; None if a certain table is asked for."""
+    names = ' '.join(args.chains)
+    if args.kinematics_file or args.version or '=' in names:
+        return None
+    return lambda catalog: options.chains_of(catalog, args)
 
 
 def _announce(chains: Sequence[Chain], args: argparse.Namespace, port: int) -> None:

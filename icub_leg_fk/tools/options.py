@@ -118,12 +118,17 @@ def chosen_chain(args: argparse.Namespace) -> Chain:
 
 
 def chains_of_one_root(args: argparse.Namespace) -> list[Chain]:
-    """Return the chains asked for, or both legs, or else all of the file.
+    """Return the chains asked for, or both legs, or else all of the file."""
+    return chains_of(load_catalog(args), args)
+
+
+def chains_of(catalog: Catalog, args: argparse.Namespace) -> list[Chain]:
+    """Return those chains of a catalog.
 
     Raises:
-        LegFKError: they have several root frames.
+        LegFKError: there are none, or they have several root frames.
     """
-    catalog = load_catalog(args)
+    refuse_no_chains(catalog)
     legs = [name for name in LEGS if name in catalog.chains]
     configuration = Configuration.checked(
         catalog,

@@ -15,7 +15,7 @@ from typing import Any, IO
 from icub_leg_fk.errors import LegFKError
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.tools.recording import JointRecording
-from icub_leg_fk.tools.ros import import_ros
+from icub_leg_fk.tools.ros import Ros
 from icub_leg_fk.tools.signals import held_signals
 import numpy as np
 
@@ -136,7 +136,12 @@ def _stop(process: subprocess.Popen[bytes]) -> None:
 
 
 class Replay:
-    """Publishes joint states in their own timing and collects poses, until it is closed.
+    """Publishes joint states in their own timing and collects poses.
+
+    Args:
+        ros: the node that does it, in the namespace of `foot_pose_publisher`.
+        recording: the joint states.
+        tips: the tips of which poses come.
 
     Attributes:
         answers: the poses of each tip.
@@ -144,59 +149,25 @@ class Replay:
     """
 
     def __init__(
-        self, recording: JointRecording, namespace: str, tips: Sequence[str]
+        self, ros: Ros, recording: JointRecording, tips: Sequence[str]
     ) -> None:
-        rclpy, joint_state, pose_stamped = import_ros('the demonstration')
         count = len(recording.times)
         self.answers = [
             Answers(tip, np.full((count, 7), np.nan), np.full(count, np.nan))
             for tip in tips
         ]
         self.sent: list[tuple[int, bytes]] = []
+        self._ros = ros
         self._recording = recording
-        self._awaited: dict[
-            int, tuple[int, float]
-        ] = {}  # by stamp: which message, sent when
+        # by stamp: which message, and when it was sent
+        self._awaited: dict[int, tuple[int, float]] = {}
         self._found: set[str] = set()
-        self._joint_state = joint_state
-        self._serialize = rclpy.serialization.serialize_message
-        self._context = rclpy.context.Context()
-        try:
-            rclpy.init(
-                args=[],
-                context=self._context,
-                signal_handler_options=rclpy.signals.SignalHandlerOptions.NO,
-            )
-            self._node = rclpy.create_node(
-                'leg_fk_demo',
-                namespace=namespace,
-                context=self._context,
-                use_global_arguments=False,
-                enable_rosout=False,
-                start_parameter_services=False,
-            )
-        except (
-            RuntimeError,
-            ValueError,
-        ) as error:  # what rclpy raises for what rcl refuses
-            raise DemoError(
-                f'ROS 2 cannot be started: {" ".join(str(error).split())}'
-            ) from error
-        self._executor = rclpy.executors.SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self._node)
-        self._publisher = self._node.create_publisher(
-            joint_state, 'joint_states', DEPTH
-        )
+        node = ros.node
+        self._publisher = node.create_publisher(ros.joint_state, 'joint_states', DEPTH)
         for answers in self.answers:
             topic = f'foot_pose_publisher/{answers.tip}/pose'
             take = partial(self._take, answers)
-            self._node.create_subscription(pose_stamped, topic, take, DEPTH)
-
-    def close(self) -> None:
-        """Leave the ROS graph."""
-        self._executor.shutdown()
-        self._node.destroy_node()
-        self._context.try_shutdown()
+            node.create_subscription(ros.pose_stamped, topic, take, DEPTH)
 
     def wait_for_node(self, check: Callable[[], None]) -> None:
         """Send messages, which do not count, until each tip has answered one.
@@ -264,7 +235,7 @@ class Replay:
     def _spin(self, seconds: float) -> None:
         # What a signal raises inside of rclpy it makes another exception of, or loses.
         with held_signals():
-            self._executor.spin_once(timeout_sec=seconds)
+            self._ros.executor.spin_once(timeout_sec=seconds)
 
     def _take(self, answers: Answers, message: Any) -> None:
         now = time.monotonic()
@@ -283,13 +254,13 @@ class Replay:
 
     def _publish(self, stamp: int, index: int) -> bytes:
         row = self._recording.positions[max(index, 0)]
-        message = self._joint_state(
+        message = self._ros.joint_state(
             name=list(self._recording.joint_names), position=row.tolist()
         )
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(
             stamp, 1_000_000_000
         )
-        data = bytes(self._serialize(message))
+        data = bytes(self._ros.rclpy.serialization.serialize_message(message))
         self._awaited[stamp] = index, time.monotonic()
         with held_signals():
             self._publisher.publish(data)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import math
 from threading import Event
 import time
-from typing import Any, Protocol
+from typing import Any
 
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
@@ -14,40 +14,17 @@ from icub_leg_fk.tools import viewer_scene as drawn
 from icub_leg_fk.tools.viewer_method import Method, STEPS
 from icub_leg_fk.tools.viewer_page import (
     Canvas,
-    Changed,
     JointSliders,
     Numbers,
-    Posture,
     tip_texts,
 )
 from icub_leg_fk.tools.viewer_scene import PosedChain, Scene
+from icub_leg_fk.tools.viewer_source import Posture, Source
 import numpy as np
 
 PERIOD = 1 / 30  # s; the page is not updated more often
 _FIELD_OF_VIEW = 0.6  # rad
 _TOWARD_VIEWER = (0.82, 0.47, 0.33)  # forward, left, up; about a unit vector
-
-
-class Source(Protocol):
-    """What moves the chains in place of the sliders.
-
-    Attributes:
-        is_moving: whether the joints may change without anything being done in the page.
-    """
-
-    is_moving: bool
-
-    def add_controls(self, gui: Any, changed: Changed) -> None:
-        """Add to the page what it is controlled by; `changed` is called when that is used."""
-
-    def advance(self) -> None:
-        """Go on to the present time."""
-
-    def postures(self) -> list[Posture]:
-        """Return the joints of every chain."""
-
-    def trails(self) -> list[Array]:
-        """Return the last places of every tip, (N, 3) each [m]."""
 
 
 class Viewer:
@@ -62,30 +39,13 @@ class Viewer:
     def __init__(
         self, server: Any, chains: Sequence[Chain], source: Source | None
     ) -> None:
-        self._chains = tuple(chains)
+        self._server = server
         self._source = source
         self._changed = Event()
-        self._size = drawn.reach(chains)
         self._canvas = Canvas(server)
-        gui = server.gui
-        gui.configure_theme(show_logo=False, show_share_button=False)
-        if source:
-            source.add_controls(gui, self._on_change)
-        self._sliders = JointSliders(
-            gui, chains, self._on_change, follow=source is not None
-        )
-        if not source:
-            button = gui.add_button('back to the start', color='gray')
-            button.on_click(lambda _: self._sliders.reset())
-        self._add_panel(gui)
-        gui.main_panel.dock_right()
-        gui.main_panel.set_width(330)
-        points = [
-            drawn.outer_points(PosedChain(chain, self._sliders.positions(chain)))
-            for chain in chains
-        ]
-        self._fixed = self._fixed_scene(np.vstack(points))
-        self._place_camera(server, np.vstack(points))
+        server.gui.configure_theme(show_logo=False, show_share_button=False)
+        self._chains: tuple[Chain, ...] = ()
+        self._build(tuple(chains))
 
     def run(self) -> None:
         """Keep the page up to date until a signal ends it."""
@@ -97,31 +57,57 @@ class Viewer:
 
     def refresh(self) -> None:
         """Bring scene, sliders and numbers up to date."""
-        postures, trails = self._postures()
+        postures = self._postures()
         scene = dict(self._fixed)
-        for index, chain in enumerate(self._chains):
-            q, note = postures[index]
+        for index, (q, note, trail) in enumerate(postures):
             if q is None:
                 self._tips[index].show({}, note)
                 continue
-            posed = PosedChain(chain, q)
-            self._sliders.show(dict(zip(chain.joint_names, q, strict=True)))
+            posed = PosedChain(self._chains[index], q)
+            self._sliders.show(dict(zip(posed.chain.joint_names, q, strict=True)))
             self._tips[index].show(tip_texts(posed), note)
             scene |= self._chain_scene(index, posed)
-            if len(trails[index]) > 1:
-                scene |= drawn.trail_scene(posed, trails[index])
+            if len(trail) > 1:
+                scene |= drawn.trail_scene(posed, trail)
         self._canvas.show(scene)
+
+    def _build(self, chains: tuple[Chain, ...]) -> None:
+        """Build the page for some chains."""
+        names = [chain.name for chain in chains]
+        is_another = names != [chain.name for chain in self._chains]
+        self._chains = chains
+        self._size = drawn.reach(chains)
+        gui = self._server.gui
+        gui.reset()
+        if self._source:
+            self._source.add_controls(gui, self._on_change)
+        self._sliders = JointSliders(
+            gui, chains, self._on_change, follow=self._source is not None
+        )
+        if not self._source:
+            button = gui.add_button('back to the start', color='gray')
+            button.on_click(lambda _: self._sliders.reset())
+        self._add_panel(gui)
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(330)
+        posed = [PosedChain(chain, self._sliders.positions(chain)) for chain in chains]
+        points = np.vstack([drawn.outer_points(each) for each in posed])
+        if is_another:
+            self._place_cameras(points)
+        floor = drawn.floor_scene(points, chains[0].root_axes, self._size)
+        self._fixed = floor | drawn.root_scene(chains[0], self._size)
 
     def _on_change(self, _: Any) -> None:
         self._changed.set()
 
-    def _postures(self) -> tuple[list[Posture], list[Array]]:
-        """Return the joints of every chain, and the last places of its tip."""
-        if self._source:
-            self._source.advance()
-            return self._source.postures(), self._source.trails()
-        postures = [Posture(self._sliders.positions(chain)) for chain in self._chains]
-        return postures, [np.zeros((0, 3))] * len(postures)
+    def _postures(self) -> list[Posture]:
+        """Return the joints of every chain, and build the page anew if the chains are others."""
+        if not self._source:
+            return [Posture(self._sliders.positions(chain)) for chain in self._chains]
+        postures = self._source.step()
+        if self._source.chains != self._chains:
+            self._build(self._source.chains)
+        return postures
 
     def _chain_scene(self, index: int, posed: PosedChain) -> Scene:
         """Return a chain; while the method is shown, that or what stands in its background."""
@@ -181,21 +167,18 @@ class Viewer:
         panel.dock_left()
         panel.set_width(450)
 
-    def _fixed_scene(self, points: Array) -> Scene:
-        """Return what does not move: the root and a floor below (N, 3) points."""
-        floor = drawn.floor_scene(points, self._chains[0].root_axes, self._size)
-        return floor | drawn.root_scene(self._chains[0], self._size)
-
-    def _place_camera(self, server: Any, points: Array) -> None:
+    def _place_cameras(self, points: Array) -> None:
         """Look at (N, 3) points from ahead of the root, a little from the left and above."""
         forward, left, up = drawn.directions(self._chains[0].root_axes)
         low, high = points.min(axis=0), points.max(axis=0)
         middle = (low + high) / 2
         radius = float(np.linalg.norm(high - low)) / 2 + 0.25 * self._size
         toward = np.array(_TOWARD_VIEWER) @ np.stack((forward, left, up))
-        camera = server.initial_camera
-        camera.fov = _FIELD_OF_VIEW
-        camera.up = up
-        camera.look_at = middle
-        camera.position = middle + radius / math.sin(_FIELD_OF_VIEW / 2) * toward
-        server.scene.set_up_direction(up)
+        self._server.scene.set_up_direction(up)
+        first = self._server.initial_camera
+        first.up = up
+        first.fov = _FIELD_OF_VIEW
+        clients = self._server.get_clients().values()
+        for camera in (first, *(client.camera for client in clients)):
+            camera.look_at = middle
+            camera.position = middle + radius / math.sin(_FIELD_OF_VIEW / 2) * toward

@@ -1,147 +1,201 @@
-"""A running robot in the viewer: the joint states that come over ROS 2."""
+"""A running robot in the viewer: what comes over ROS 2, its joint states and its description."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from threading import Lock, Thread
 import time
 from typing import Any
 
 from icub_leg_fk.errors import LegFKError
-from icub_leg_fk.kinematics import Chain
-from icub_leg_fk.kinematics.rotation import Array
+from icub_leg_fk.kinematics import Catalog, Chain, Urdf
+from icub_leg_fk.stream.cdr import read_string
 from icub_leg_fk.stream.configuration import DEFAULT_TIMEOUT
 from icub_leg_fk.stream.joint_input import JointInput
 from icub_leg_fk.stream.notes import Note, notes_of
-from icub_leg_fk.tools.ros import import_ros
-from icub_leg_fk.tools.viewer_page import Changed, Posture
+from icub_leg_fk.tools.ros import running_ros
+from icub_leg_fk.tools.viewer_page import Numbers
+from icub_leg_fk.tools.viewer_source import (
+    Changed,
+    Posture,
+    posture_at,
+    TRAIL,
+    TRAIL_POINTS,
+)
 import numpy as np
 
-DEFAULT_TOPIC = 'joint_states'
+_DEFAULT_TOPIC = 'joint_states'
 _DEPTH = 100
 _LOOK_PERIOD = 1.0  # s
-_NO_TRAIL = np.zeros((0, 3))
+_INTERVAL = TRAIL / TRAIL_POINTS  # s; a trail has no samples nearer to each other
+
+Select = Callable[[Catalog], Sequence[Chain]]
+Samples = deque[tuple[float, Sequence[float]]]  # when they came [s], joint positions
 
 
-class LiveJoints:
+class LiveRobot:
     """Moves the chains as joint states say, by the node's own rules.
 
     Args:
         chains: the chains.
-        topic: topic of the joint states.
+        topics: topics of the joint states; `joint_states` if none is named.
+        select: what selects the chains of a description of the robot, which then take the place of
+            those; None if no description is to be followed.
+
+    Attributes:
+        topics: topics of the joint states.
+        description_topic: topic of the description, in the namespace of the first of these.
     """
 
     is_moving = True
 
-    def __init__(self, chains: Sequence[Chain], topic: str) -> None:
-        self._topic = topic
+    def __init__(
+        self,
+        chains: Sequence[Chain],
+        topics: Sequence[str] = (),
+        select: Select | None = None,
+    ) -> None:
+        self.topics = tuple(topics) or (_DEFAULT_TOPIC,)
+        namespace, slash, _ = self.topics[0].rpartition('/')
+        self.description_topic = f'{namespace}{slash}robot_description'
+        self._topic = ' and '.join(self.topics)
+        self._select = select
+        self._description: bytes | None = None
+        self._about: list[str] = []
+        if select:
+            self._about = [
+                'the tables, until a description',
+                f'on {self.description_topic}',
+            ]
+        self._doubts = ''
+        self._lock = Lock()
         self._input = JointInput(time.time_ns)
-        self._input.configure(chains, DEFAULT_TIMEOUT)
-        self._newest: dict[
-            str, tuple[Sequence[float], float]
-        ] = {}  # q, and when it came [s]
         self._notes: list[Note] = []
         self._looked = time.monotonic()
-        self._lock = Lock()
+        self._show(chains)
 
     def take(self, data: bytes) -> None:
         """Take a serialized JointState."""
         now = time.monotonic()
         with self._lock:
             for ready in self._input.feed(data):
-                self._newest[ready.chain.name] = ready.positions, now
+                samples = self._samples[ready.chain.name]
+                if len(samples) > 1 and now - samples[-2][0] < _INTERVAL:
+                    samples.pop()
+                samples.append((now, ready.positions))
+
+    def take_description(self, data: bytes) -> None:
+        """Take a serialized String, which is a description of the robot."""
+        self._description = data
 
     def add_controls(self, gui: Any, changed: Changed) -> None:
-        """Say in the page what moves the chains."""
-        gui.add_markdown(f'live from `{self._topic}`')
+        """Say in the page what moves the chains, and what they are."""
+        self._words = Numbers(gui)
+        self._say()
 
-    def advance(self) -> None:
-        """Look once a second at what there is to say of the messages."""
+    def step(self) -> list[Posture]:
+        """Take in what has come, and return the joints of every chain as they came last."""
+        data, self._description = self._description, None
+        if data is not None:
+            self._use(data)
+        with self._lock:
+            samples = {name: list(taken) for name, taken in self._samples.items()}
         now = time.monotonic()
-        if now < self._looked + _LOOK_PERIOD:
-            return
-        self._looked = now
+        if now > self._looked + _LOOK_PERIOD:
+            self._looked = now
+            self._look()
+        postures = []
+        for chain in self.chains:
+            times = np.array([came for came, _ in samples[chain.name]])
+            positions = np.array([q for _, q in samples[chain.name]])
+            posture = posture_at(now, chain, times, positions)
+            postures.append(self._noted(chain.name, posture))
+        return postures
+
+    def _show(self, chains: Sequence[Chain]) -> None:
+        self.chains = tuple(chains)
+        with self._lock:
+            self._input.configure(chains, DEFAULT_TIMEOUT)
+            self._samples: dict[str, Samples] = {
+                chain.name: deque(maxlen=TRAIL_POINTS) for chain in chains
+            }
+
+    def _use(self, data: bytes) -> None:
+        """Show the chains of a description; if it cannot be used, what was shown stays."""
+        assert self._select
+        try:
+            urdf = Urdf.parse(read_string(data), self.description_topic)
+            catalog = Catalog.from_urdf(urdf)
+            chains = tuple(self._select(catalog))
+        except LegFKError as error:
+            self._doubts = f'description of the robot not used: {error}'
+        else:
+            self._about = [f'the description of {urdf.name}', f'on {urdf.file}']
+            self._doubts = '; '.join(catalog.warnings)
+            if chains != self.chains:
+                self._show(chains)
+        self._say()
+
+    def _say(self) -> None:
+        self._words.show({f'live from {self._topic}': self._about}, self._doubts)
+
+    def _look(self) -> None:
+        """Look at what there is to say of the messages."""
         with self._lock:
             look = self._input.take_look()
         self._notes = notes_of(look, self._topic)
         if not look.messages:
             self._notes = [Note('no_message', '', '', f'no message on {self._topic}')]
 
-    def postures(self) -> list[Posture]:
-        """Return the joints of every chain as they came last."""
-        with self._lock:
-            newest = dict(self._newest)
-        return [
-            self._posture(chain, *newest.get(chain.name, (None, 0.0)))
-            for chain in self._input.chains
-        ]
-
-    def trails(self) -> list[Array]:
-        """Return no places: only the trails of a recording are drawn."""
-        return [_NO_TRAIL] * len(self._input.chains)
-
-    def _posture(self, chain: Chain, q: Sequence[float] | None, came: float) -> Posture:
-        age = time.monotonic() - came
-        if q is not None and age <= DEFAULT_TIMEOUT:
-            return Posture(q)
-        words = ['no pose yet' if q is None else f'no pose for {age:.1f} s']
-        words += [note.text for note in self._notes if note.chain in ('', chain.name)]
-        return Posture(q, '; '.join(words))
+    def _noted(self, chain: str, posture: Posture) -> Posture:
+        """Return a posture with the reasons why there is none, or no newer one."""
+        if not posture.note:
+            return posture
+        texts = [note.text for note in self._notes if note.chain in ('', chain)]
+        return posture._replace(note='; '.join([posture.note, *texts]))
 
 
 @contextmanager
-def live_joints(chains: Sequence[Chain], topic: str) -> Iterator[LiveJoints]:
-    """Follow the joint states of a topic while it lasts.
+def live_robot(
+    chains: Sequence[Chain], topics: Sequence[str], select: Select | None
+) -> Iterator[LiveRobot]:
+    """Follow a running robot while it lasts; the arguments are those of `LiveRobot`.
 
     Raises:
         MissingDependencyError: rclpy is not installed.
-        LegFKError: ROS 2 cannot be started, or the topic has no such name.
+        LegFKError: ROS 2 cannot be started, or a topic has no such name.
     """
-    rclpy, joint_state, _ = import_ros('view --live')
-    joints = LiveJoints(chains, topic)
-    context = rclpy.context.Context()
-    quality = rclpy.qos.QoSProfile(
-        depth=_DEPTH, reliability=rclpy.qos.QoSReliabilityPolicy.BEST_EFFORT
-    )
-    try:
-        rclpy.init(
-            args=[],
-            context=context,
-            signal_handler_options=rclpy.signals.SignalHandlerOptions.NO,
+    robot = LiveRobot(chains, topics, select)
+    with running_ros('view --live', 'leg_fk_view') as ros:
+        qos = ros.rclpy.qos
+        best_effort = qos.QoSProfile(
+            depth=_DEPTH, reliability=qos.QoSReliabilityPolicy.BEST_EFFORT
         )
-        node = rclpy.create_node(
-            'leg_fk_view',
-            context=context,
-            use_global_arguments=False,
-            enable_rosout=False,
-            start_parameter_services=False,
+        last_one = qos.QoSProfile(
+            depth=1, durability=qos.QoSDurabilityPolicy.TRANSIENT_LOCAL
         )
-        node.create_subscription(joint_state, topic, joints.take, quality, raw=True)
-    except rclpy.exceptions.InvalidTopicNameException as error:
-        context.try_shutdown()
-        reason = str(error).splitlines()[0].rstrip(':').partition(': ')[2]
-        raise LegFKError(f'--joint-topic: found {topic!r}; {reason}') from error
-    except (
-        RuntimeError,
-        ValueError,
-    ) as error:  # what rclpy raises for what rcl refuses
-        context.try_shutdown()
-        raise LegFKError(
-            f'ROS 2 cannot be started: {" ".join(str(error).split())}'
-        ) from error
-    executor = rclpy.executors.SingleThreadedExecutor(context=context)
-    executor.add_node(node)
-
-    def spin() -> None:
-        with suppress(rclpy.executors.ExternalShutdownException):
-            executor.spin()
-
-    thread = Thread(target=spin)
-    thread.start()
-    try:
-        yield joints
-    finally:
-        context.try_shutdown()
-        thread.join()
-        node.destroy_node()
+        for topic in robot.topics:
+            try:
+                ros.node.create_subscription(
+                    ros.joint_state, topic, robot.take, best_effort, raw=True
+                )
+            except ros.rclpy.exceptions.InvalidTopicNameException as error:
+                reason = str(error).splitlines()[0].rstrip(':').partition(': ')[2]
+                raise LegFKError(f'--joint-topic: found {topic!r}; {reason}') from error
+        if select:
+            ros.node.create_subscription(
+                ros.string,
+                robot.description_topic,
+                robot.take_description,
+                last_one,
+                raw=True,
+            )
+        thread = Thread(target=ros.executor.spin)
+        thread.start()
+        try:
+            yield robot
+        finally:
+            ros.executor.shutdown()
+            thread.join()

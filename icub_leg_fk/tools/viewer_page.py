@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 import html
 from importlib import import_module
 import io
 import math
 import socket
-from typing import Any, NamedTuple
+from typing import Any
 
 from icub_leg_fk.errors import LegFKError, MissingDependencyError
 from icub_leg_fk.kinematics import Chain, chain_text, DHLink
@@ -17,6 +17,7 @@ from icub_leg_fk.kinematics.rotation import Array, roll_pitch_yaw
 from icub_leg_fk.tools import text
 from icub_leg_fk.tools.signals import held_signals
 from icub_leg_fk.tools.viewer_scene import Dots, Label, Lines, PosedChain, Scene
+from icub_leg_fk.tools.viewer_source import Changed
 import numpy as np
 
 _BEYOND = 0.2  # of a range; so far beyond it a slider goes
@@ -34,20 +35,6 @@ _ROUNDING = 1e-9  # rad or m; from degrees and back
 _GREY, _RED = '#777777', '#d00000'
 _SMALL = 'font-size:11px;line-height:1.2;padding:0 8px'
 _COPIED = 'margin:0;padding:2px 8px 6px;font:11px/1.4 monospace;overflow-x:auto;user-select:all'
-
-Changed = Callable[[Any], None]
-
-
-class Posture(NamedTuple):
-    """The joints of a chain.
-
-    Attributes:
-        q: n joint positions [rad or m]; None while they are not known.
-        note: what is to be said of them in red; empty if nothing.
-    """
-
-    q: Sequence[float] | None
-    note: str = ''
 
 
 @contextmanager

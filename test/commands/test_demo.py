@@ -1,6 +1,5 @@
 """`leg_fk demo`: the node in its own process over DDS, from outside."""
 
-from contextlib import closing
 import os
 from pathlib import Path
 import pty
@@ -18,6 +17,7 @@ from icub_leg_fk.kinematics import config_file
 from icub_leg_fk.stream.configuration import LEGS
 from icub_leg_fk.tools import replay as replays
 from icub_leg_fk.tools.recording import read_joints
+from icub_leg_fk.tools.ros import running_ros
 from icub_leg_fk.tools.terminal import import_rich
 import numpy as np
 import pytest
@@ -131,13 +131,17 @@ def test_talks_inside_the_machine_in_a_domain_of_its_own(monkeypatch):
     assert 'ROS_STATIC_PEERS' not in os.environ
 
 
-def test_recording_is_played_in_its_own_timing():
+def test_recording_is_played_in_its_own_timing_to_a_robot_of_a_urdf():
+    assert run_main('urdf', 'left_leg', 'right_leg', '-o', 'robot.urdf').returncode == 0
     times = np.cumsum(
         np.r_[5.0, np.tile([0.002, 0.04, 0.0], 17)[:49]]
     )  # 0.7 s, from 5 s on
     write_csv(Path('walk.csv'), times, walk(0.49).positions)
-    done = run_main('demo', '--recording', 'walk.csv', '-o', 'walk.svg')
+    done = run_main(
+        'demo', '-k', 'robot.urdf', '--recording', 'walk.csv', '-o', 'walk.svg'
+    )
     assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith('iCub legs urdf: 50 JointState messages')
     assert f'namespace /leg_fk_demo_{os.getpid()})' in done.stdout
     assert f'messages in   50  in {times[-1] - times[0]:.2f} s' in done.stdout
     assert re.search(r'poses out +100 ', done.stdout)
@@ -152,9 +156,10 @@ def test_poses_received_are_those_of_the_chains(version, foot_frame):
     parameters |= replays.lossless(namespace, TIPS, 1000)
     gait = walk(0.5)
     with (
-        closing(replays.Replay(gait, namespace, TIPS)) as replay,
+        running_ros('the test', 'leg_fk_test', namespace) as ros,
         replays.running_node(namespace, parameters) as (_, check),
     ):
+        replay = replays.Replay(ros, gait, TIPS)
         replay.wait_for_node(check)
         replay.play(lambda elapsed: None, 0.1, check)
     chains = Catalog.load().select(LEGS, version)
@@ -260,6 +265,8 @@ def test_on_a_terminal_the_table_is_redrawn_in_place():
         ('--seconds 0', ['--seconds', '0.1']),
         ('-o demo.gif', ['.gif', '.png']),
         ('-o none/demo.png', ['none']),
+        ('-o /proc/demo.png', ['/proc/demo.png', 'cannot be written']),
+        ('-k panda.yaml', ["unknown chain 'left_leg'", 'known: panda']),
         ('-o bad.csv.png --save none/walk', ['none']),
         ('--save bad.csv', ['bad.csv', 'exists']),
         ('--save kept.mcap', ['kept.mcap', '--force']),
@@ -272,6 +279,7 @@ def test_bad_input_is_one_line_and_exit_2(typed, named):
     positions[1, JOINTS.index('r_knee')] = 1e300
     write_csv(Path('bad.csv'), [0.0, 0.1], positions)
     Path('kept.mcap').touch()
+    Path('panda.yaml').symlink_to(config_file('examples/panda.yaml'))
     done = run_main('demo', *shlex.split(typed))
     for word in named:
         assert_one_line_complaint(done, word)

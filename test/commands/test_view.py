@@ -8,28 +8,32 @@ import signal
 import socket
 import subprocess
 import sys
+from threading import Event, Thread
 import time
+from unittest.mock import MagicMock
 import webbrowser
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from icub_leg_fk.kinematics import Chain, DHLink, load_chain
 from icub_leg_fk.kinematics.rotation import turns_about
-from icub_leg_fk.tools.viewer import Viewer
-from icub_leg_fk.tools.viewer_live import live_joints, LiveJoints
+from icub_leg_fk.tools.tracks import read_tracks, track_of
+from icub_leg_fk.tools.viewer import PERIOD, Viewer
+from icub_leg_fk.tools.viewer_live import live_robot, LiveRobot
 from icub_leg_fk.tools.viewer_method import arc, Method, STEPS
 from icub_leg_fk.tools.viewer_page import (
-    Posture,
     roll_pitch_yaw,
     running_server,
     slider_bounds,
     slider_start,
 )
-from icub_leg_fk.tools.viewer_recording import RecordedChain
+from icub_leg_fk.tools.viewer_recording import Recording
 from icub_leg_fk.tools.viewer_scene import directions, labels, PosedChain
+from icub_leg_fk.tools.viewer_source import posture_at
 import numpy as np
 import pytest
 from support.any_chain import chains_and_positions
+from support.bag_files import joint_state, string
 from support.browser import (
     copied_texts,
     running_tab,
@@ -38,6 +42,7 @@ from support.browser import (
     still_picture,
     wait_until,
 )
+from support.described_robots import own_description
 from support.leg_fk_process import assert_one_line_complaint, COMMAND, run_main
 
 EXAMPLES = Path(__file__).resolve().parents[2] / 'config' / 'examples'
@@ -54,6 +59,7 @@ LEG_JOINTS = [
         'ankle_roll',
     )
 ]
+LEGS = [load_chain(name) for name in ('left_leg', 'right_leg')]
 _LISTENS = '0A'  # state of a socket in /proc/net/tcp
 BENT = np.radians([0, 10, 0, -30, -15, 5]).tolist()
 
@@ -96,13 +102,46 @@ def view():
 @pytest.fixture
 def page(tab, view):
     _, address = view
-    show_page(tab, address)
-    return tab
+    return show_page(tab, address)
+
+
+@pytest.fixture(scope='module')
+def server():
+    pytest.importorskip('viser')
+    with running_server('127.0.0.1', 0) as server:
+        yield server
+
+
+@pytest.fixture
+def page_of(tab, server):
+    """Return what shows chains as a source moves them, in a page that is kept up to date."""
+    ended = Event()
+    threads = []
+
+    def show(source):
+        viewer = Viewer(server, source.chains, source)
+
+        def run():
+            while not ended.wait(PERIOD):
+                viewer.refresh()
+
+        threads.append(Thread(target=run))
+        threads[0].start()
+        return show_page(tab, f'http://127.0.0.1:{server.get_port()}/')
+
+    yield show
+    ended.set()
+    threads[0].join()
 
 
 def numbers(text):
     """Return the numbers with seven decimals in a text, without the spaces that align them."""
     return sorted(re.findall(r'-?\d+\.\d{7}\b', text))
+
+
+def shown_numbers(page):
+    """Return those that a page shows."""
+    return numbers(' '.join(copied_texts(page)))
 
 
 def numbers_of_pose(chain, q):
@@ -125,9 +164,7 @@ def test_a_moved_slider_gives_the_numbers_of_pose_and_a_red_line(page):
         numbers_of_pose('left_leg', q),
         numbers_of_pose('right_leg', [0.0] * 6),
     )
-    wait_until(
-        page, lambda: numbers(' '.join(copied_texts(page))) == sorted(left + right)
-    )
+    wait_until(page, lambda: shown_numbers(page) == sorted(left + right))
     page.get_by_role('button', name='back to the start').click()
     wait_until(page, lambda: knee.get_attribute('aria-valuenow') == '0')
 
@@ -140,6 +177,10 @@ def test_every_step_of_the_method_changes_the_scene(page):
         page.get_by_text(f'Step {number}. {title}').wait_for()
         before = still_picture(page, other_than=before)
     page.get_by_text('l_foot_dh_frame in root_link = T_Ro0 T_06 =').wait_for()
+    slider(page, 'step').press('ArrowLeft')
+    slider(page, 'row').press('End')
+    page.get_by_text('row i = 5, l_ankle_roll').wait_for()
+    still_picture(page, other_than=before)
 
 
 def test_nothing_listens_but_this_machine(view):
@@ -172,26 +213,46 @@ def shown_address(host, port):
     return socket.inet_ntop(family, b''.join(words)), int(port, 16)
 
 
-def test_a_recording_is_played_and_paused(tab):
-    with running_view('--recording', WALK) as (_, address):
-        page = show_page(tab, address)
-        time_line = slider(page, 'time [s]')
-        assert not slider(page, 'l_knee').is_visible()  # it follows
-        before = copied_texts(page)
-        page.get_by_role('button', name='play').click()
-        wait_until(page, lambda: copied_texts(page) != before)
-        page.get_by_role('button', name='pause').click()
-        page.get_by_role('button', name='play').wait_for()
-        assert 0.0 < float(time_line.get_attribute('aria-valuenow')) < 4.99
-        time_line.press('End')
-        last = np.genfromtxt(WALK, delimiter=',', names=True)[-1]
-        q = [float(last[name]) for name in LEG_JOINTS]
-        expected = numbers_of_pose('left_leg', q[:6]) + numbers_of_pose(
-            'right_leg', q[6:]
-        )
-        wait_until(
-            page, lambda: numbers(' '.join(copied_texts(page))) == sorted(expected)
-        )
+def test_a_recording_is_played_and_paused(page_of):
+    page = page_of(Recording(read_tracks([WALK], LEGS).tracks))
+    time_line = slider(page, 'time [s]')
+    assert not slider(page, 'l_knee').is_visible()  # it follows
+    before = copied_texts(page)
+    page.get_by_role('button', name='play').click()
+    wait_until(page, lambda: copied_texts(page) != before)
+    page.get_by_role('button', name='pause').click()
+    page.get_by_role('button', name='play').wait_for()
+    assert 0.0 < float(time_line.get_attribute('aria-valuenow')) < 4.99
+    time_line.press('End')
+    last = np.genfromtxt(WALK, delimiter=',', names=True)[-1]
+    q = [float(last[name]) for name in LEG_JOINTS]
+    left, right = (
+        numbers_of_pose('left_leg', q[:6]),
+        numbers_of_pose('right_leg', q[6:]),
+    )
+    wait_until(page, lambda: shown_numbers(page) == sorted(left + right))
+
+
+def test_a_live_robot_is_shown_by_its_description(page_of):
+    robot = LiveRobot(LEGS[:1], ['/lab/joint_states'], select_left_leg)
+    page = page_of(robot)
+    page.get_by_text('the tables, until a description').wait_for()
+    page.get_by_text('no pose yet').wait_for()
+    robot.take_description(string(own_description('v1')))
+    page.get_by_text('the description of robot_v1').wait_for()
+    page.get_by_text('on /lab/robot_description').wait_for()
+    page.get_by_text('left_leg=urdf', exact=True).first.wait_for()
+    robot.take(joint_state(1, LEGS[0].joint_names, BENT))
+    page.get_by_text('no pose for').wait_for()
+    robot.take_description(string('<robot'))
+    page.get_by_text('description of the robot not used').wait_for()
+    page.get_by_text('the description of robot_v1').wait_for()
+    page.get_by_text('no message on /lab/joint_states').wait_for()
+    assert shown_numbers(page) == numbers_of_pose('left_leg=v1', BENT)
+
+
+def select_left_leg(catalog):
+    return catalog.select(['left_leg'])
 
 
 def test_the_page_is_opened_and_its_address_printed(monkeypatch):
@@ -215,8 +276,7 @@ def test_the_page_is_opened_and_its_address_printed(monkeypatch):
     assert f'note: port {port} is taken' in done.stderr
 
 
-def test_the_page_is_updated_at_most_30_times_a_second(monkeypatch):
-    pytest.importorskip('viser')
+def test_the_page_is_updated_at_most_30_times_a_second(server, monkeypatch):
     times = []
 
     def refresh(viewer):
@@ -225,9 +285,8 @@ def test_the_page_is_updated_at_most_30_times_a_second(monkeypatch):
             raise KeyboardInterrupt
 
     monkeypatch.setattr(Viewer, 'refresh', refresh)
-    chain = load_chain('left_leg')
-    with running_server('127.0.0.1', 0) as server, pytest.raises(KeyboardInterrupt):
-        Viewer(server, [chain], LiveJoints([chain], 'joint_states')).run()
+    with pytest.raises(KeyboardInterrupt):
+        Viewer(server, LEGS, LiveRobot(LEGS)).run()
     assert times[-1] - times[0] > 6 / 30 - 1e-3
 
 
@@ -238,6 +297,7 @@ def test_the_page_is_updated_at_most_30_times_a_second(monkeypatch):
         (['--port', '99999'], "found '99999', allowed: 1 to"),
         (['--joint-topic', '/x'], '--joint-topic goes with --recording or --live'),
         (['--recording', 'none.csv'], 'none.csv: there is no such file'),
+        (['--recording', WALK, WALK], 'brings joint l_hip_pitch, and so does'),
         (['--recording', 'a.csv', '--live'], 'not allowed with'),
         (['left_leg=v3', 'right_leg=v1'], 'do not go together'),
         (['left_legs'], "did you mean 'left_leg'?"),
@@ -270,22 +330,32 @@ def test_a_topic_with_no_such_name_is_refused():
 
 def test_a_live_robot_moves_the_chains():
     rclpy = pytest.importorskip('rclpy')
-    messages = pytest.importorskip('sensor_msgs.msg')
+    sensor_msgs = pytest.importorskip('sensor_msgs.msg')
+    std_msgs = pytest.importorskip('std_msgs.msg')
+    qos = pytest.importorskip('rclpy.qos')
     chain = load_chain('left_leg')
     context = rclpy.Context()
     rclpy.init(context=context)
-    node = rclpy.create_node('robot', context=context)
-    publisher = node.create_publisher(messages.JointState, 'view_test/joint_states', 10)
-    deadline = time.monotonic() + 10.0
-    message = messages.JointState(
+    node = rclpy.create_node('robot', context=context, namespace='view_test')
+    publisher = node.create_publisher(sensor_msgs.JointState, 'joint_states', 10)
+    latched = qos.QoSProfile(depth=1, durability=qos.DurabilityPolicy.TRANSIENT_LOCAL)
+    descriptions = node.create_publisher(std_msgs.String, 'robot_description', latched)
+    descriptions.publish(std_msgs.String(data=own_description('v1')))
+    message = sensor_msgs.JointState(
         name=['other', *chain.joint_names], position=[9.0, *BENT]
     )
-    with live_joints([chain], 'view_test/joint_states') as live:
-        assert live.postures()[0].q is None
-        while live.postures()[0].q is None and time.monotonic() < deadline:
+    deadline = time.monotonic() + 10.0
+    with live_robot([chain], ['view_test/joint_states'], select_left_leg) as robot:
+        robot.add_controls(MagicMock(), None)
+        [posture] = robot.step()
+        assert posture.q is None
+        while posture.q is None or robot.chains[0].version != 'urdf':
+            assert time.monotonic() < deadline
             publisher.publish(message)
             time.sleep(0.02)
-        assert live.postures() == [Posture(tuple(BENT))]
+            [posture] = robot.step()
+    assert (posture.q, posture.note) == (BENT, '')
+    np.testing.assert_allclose(posture.trail[-1], robot.chains[0].pose(BENT)[:3])
     context.try_shutdown()
 
 
@@ -483,7 +553,7 @@ def rotation(roll, pitch, yaw):
     return turns_about(z, yaw) @ turns_about(y, pitch) @ turns_about(x, roll)
 
 
-def test_a_recording_shows_the_newest_sample_and_how_old_it_is():
+def test_the_newest_sample_is_shown_and_how_old_it_is():
     chain = Chain(
         'slide',
         '',
@@ -493,9 +563,20 @@ def test_a_recording_shows_the_newest_sample_and_how_old_it_is():
         (DHLink(0.0, 0.0, 0.0, joint_type='prismatic'),),
         np.eye(4),
     )
-    times = np.array([1.0, 3.0, 2.0])  # the clock was set
-    track = RecordedChain(chain, times, np.array([[0.1], [0.3], [0.2]]))
-    assert track.posture(0.5) == (None, 'no pose yet')
-    assert track.posture(2.4) == ([0.2], '')
-    assert track.posture(4.0) == ([0.3], 'no pose for 1.0 s')
-    np.testing.assert_allclose(track.trail(3.5)[:, 2], [0.2, 0.3])
+    times, positions = np.array([1.0, 2.0, 3.0]), np.array([[0.1], [0.2], [0.3]])
+    assert posture_at(0.5, chain, times, positions)[:2] == (None, 'no pose yet')
+    assert posture_at(2.4, chain, times, positions)[:2] == ([0.2], '')
+    q, note, trail = posture_at(4.0, chain, times, positions)
+    assert (q, note) == ([0.3], 'no pose for 1.0 s')
+    np.testing.assert_allclose(trail[:, 2], [0.2, 0.3])
+
+
+def test_a_recording_with_a_clock_that_was_set_is_shown_in_order():
+    times, positions = np.array([1.0, 3.0, 2.0]), np.zeros((3, 6))
+    positions[:, 3] = [0.1, 0.3, 0.2]
+    recording = Recording([track_of(LEGS[0], times, positions)])
+    gui = MagicMock()
+    recording.add_controls(gui, None)
+    gui.add_slider.return_value.value = 2.4
+    [posture] = recording.step()
+    assert posture.q[3] == 0.2
