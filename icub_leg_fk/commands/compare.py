@@ -1,7 +1,7 @@
 """`leg_fk compare`: which version of the tables a robot is, and how far off, by its URDF."""
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 import shlex
 import textwrap
@@ -30,6 +30,7 @@ different leg does not. The version that fits best is the nearest.
 examples:
   leg_fk compare icub.urdf
   leg_fk compare icub.urdf --chains left_leg right_leg
+  leg_fk compare icub.urdf --root base_link
   leg_fk compare icub.urdf --json"""
 
 _SAMPLES = 400
@@ -39,8 +40,7 @@ _USABLE = 10.0  # mm
 _WIDTH = 80
 _FEWEST_JOINTS = 3  # for constants at both ends to be distinguished from the joints
 _NODE = 'ros2 run icub_leg_fk foot_pose_publisher --ros-args'
-_HEADER = ('chain', 'version', 'frame', 'mm', 'deg', 'fit mm', 'fit deg', '')
-_NUMBERS = range(3, 7)  # the columns of numbers
+_HEADER = ('chain', 'frame', 'mm', 'deg', 'fit mm', 'fit deg', '')
 
 
 class FrameComparison(NamedTuple):
@@ -78,38 +78,40 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs='+',
         help='chains to compare (default: all whose joints the robot has)',
     )
-    options.add(parser, '--kinematics-file', '--root', '--json')
+    parser.add_argument(
+        '--root',
+        dest='robot_root',
+        metavar='LINK',
+        help="the robot's link that the tables' root frame is compared with (default: the one "
+        'of its name)',
+    )
+    options.add(parser, '--kinematics-file', '--json')
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the comparison."""
     catalog, urdf = options.load_catalog(args), Urdf.load(args.urdf)
-    found, not_compared = _compare_all(
-        catalog, args.chains or list(catalog.chains), urdf
-    )
+    if args.robot_root:
+        urdf.check_link(args.robot_root)
+    robot = _Robot(urdf, args.robot_root)
+    found, not_compared = _compare_all(catalog, args.chains or catalog.chains, robot)
     nearest = _nearest_of_each_chain(found)
     advice = [_summary(row, found) for row in nearest]
-    advice += [
-        f'{name}: not compared: {reason}' for name, reason in not_compared.items()
-    ]
-    advice += _what_to_run(nearest, urdf, args)
+    advice += [*not_compared, *_what_to_run(nearest, robot, args)]
     if args.json:
-        differences = [_as_json(row, row in nearest) for row in found]
-        print(
-            text.as_json(
-                {
-                    'urdf': args.urdf,
-                    'robot': urdf.name,
-                    'advice': advice,
-                    'differences': differences,
-                }
-            )
-        )
+        comparison = {
+            'urdf': args.urdf,
+            'robot': urdf.name,
+            'advice': advice,
+            'differences': [_as_json(row, row in nearest) for row in found],
+        }
+        print(text.as_json(comparison))
         return 0
     print(f'{args.urdf} ({urdf.name}) compared with the tables of')
     print(f'{catalog.file}')
     print(f'{_SAMPLES} postures within +-{_REACH} rad; largest difference\n')
-    print('\n'.join(_table([_cells(row, row in nearest) for row in found])))
+    rows = [_cells(row, row in nearest) for row in found]
+    print(*text.columns(rows, header=_HEADER), sep='\n')
     print()
     for line in advice:
         is_command = line.startswith('  ')
@@ -119,60 +121,87 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+class _Robot(NamedTuple):
+    """A robot that tables are compared with, and which of its links is their root frame."""
+
+    urdf: Urdf
+    named_root: str | None
+
+    def root(self, chain: Chain) -> str:
+        return self.named_root or chain.root_frame
+
+    def lacks(self, chain: Chain) -> str:
+        """Return what of a chain the robot lacks; nothing if it can be compared."""
+        ends = self.root(chain), chain.frame_id
+        for link in ends:
+            if link not in self.urdf.links:
+                return f'the robot has no link {link}'
+        try:
+            path = self.urdf.path(*ends)
+        except InputFileError as error:
+            return error.fault
+        on_the_way = {joint.name for joint in path} | {joint.moved_by for joint in path}
+        missing = [name for name in chain.joint_names if name not in on_the_way]
+        if not missing:
+            return ''
+        return (
+            f'between {" and ".join(ends)} the robot has no joint {", ".join(missing)}'
+        )
+
+    def forward(self, chain: Chain, positions: Mapping[str, Array]) -> Array:
+        """Return the robot's own transforms; what moves the chain's joints is moved along."""
+        ends, moved = (self.root(chain), chain.frame_id), dict(positions)
+        for joint in self.urdf.path(*ends):
+            if joint.moves and joint.name in positions:
+                master = (positions[joint.name] - joint.offset) / joint.gain
+                moved.setdefault(joint.moved_by, master)
+        return self.urdf.forward(*ends, moved)
+
+
 def _compare_all(
-    catalog: Catalog, names: Sequence[str], urdf: Urdf
-) -> tuple[list[FrameComparison], dict[str, str]]:
-    """Return the comparisons of some chains, and why the others are not compared, by name.
+    catalog: Catalog, names: Iterable[str], robot: _Robot
+) -> tuple[list[FrameComparison], list[str]]:
+    """Return the comparisons of some chains, and a sentence for each reason why others have none.
 
     Raises:
         InputFileError: no chain can be compared.
     """
     found: list[FrameComparison] = []
-    not_compared: dict[str, str] = {}
+    names_by_reason: dict[str, list[str]] = {}
     for name in names:
-        rows, reason = _compare_chain(catalog, name, urdf)
-        found += rows
+        rows: list[FrameComparison] = []
+        reasons: list[str] = []
+        for table in _versions(catalog, name):
+            lacks = {}
+            for frame in table.tip_frames:
+                lacks[frame] = robot.lacks(table.with_frame(frame))
+            frames = [frame for frame, reason in lacks.items() if not reason]
+            rows += _compare_frames(table, frames, robot)
+            reasons += lacks.values()
         if not rows:
-            not_compared[name] = reason
+            names_by_reason.setdefault(reasons[0], []).append(name)
+        found += rows
+    not_compared = [
+        f'{", ".join(names)}: not compared: {reason}'
+        for reason, names in names_by_reason.items()
+    ]
     if not found:
-        reasons = '; '.join(
-            f'{name}: {reason}' for name, reason in not_compared.items()
-        )
         raise InputFileError(
-            urdf.file,
-            f'cannot be compared: {reasons}; -k takes tables with the '
-            'names of this robot',
+            robot.urdf.file,
+            f'{"; ".join(not_compared)}; --root names another root link, and -k tables with '
+            'the names of this robot, as leg_fk table makes them',
         )
     return found, not_compared
 
 
-def _compare_chain(
-    catalog: Catalog, name: str, urdf: Urdf
-) -> tuple[list[FrameComparison], str]:
-    """Return the comparisons of a chain's versions, and why there is none if there is none."""
-    rows: list[FrameComparison] = []
-    reasons: list[str] = []
-    for table in _versions(catalog, name):
-        frames = []
-        for frame in table.tip_frames:
-            reason = _lacks(urdf, table.with_frame(frame))
-            reasons.append(reason)
-            if not reason:
-                frames.append(frame)
-        rows += compare_frames(table, frames, urdf)
-    return rows, reasons[0]
-
-
-def _versions(catalog: Catalog, name: str) -> list[Chain]:
+def _versions(catalog: Catalog, name: str) -> Iterable[Chain]:
     """Return a chain in all its versions, or in the one that is named with it."""
     chain, version = catalog.split(name)
-    if version:
-        return [catalog.chain(name)]
-    return list(catalog.entry(chain).versions.values())
+    return [catalog.chain(name)] if version else catalog.entry(chain).versions.values()
 
 
-def compare_frames(
-    table: Chain, frames: Sequence[str], urdf: Urdf
+def _compare_frames(
+    table: Chain, frames: Sequence[str], robot: _Robot
 ) -> list[FrameComparison]:
     """Return how far a table is from a robot, for some of its tip frames.
 
@@ -184,66 +213,22 @@ def compare_frames(
     fitted, root_turn, X = None, '', np.eye(4)
     for frame in frames:
         chain = table.with_frame(frame)
-        ours = chain.forward(positions)
-        theirs = urdf.forward(
-            chain.root_frame, chain.frame_id, _for_masters(positions, chain, urdf)
-        )
+        ours, theirs = chain.forward(positions), robot.forward(chain, positions)
         if not rows and chain.n >= _FEWEST_JOINTS:
             X, Y = fit(ours, theirs)
             fitted = distance(X @ ours @ Y, theirs)
             root_turn = turn_in_words(X[:3, :3]) if fitted.deg <= _NEAR else ''
         turn = turn_of_axes(X @ ours if root_turn else ours, theirs)
-        rows.append(
-            FrameComparison(
-                chain,
-                distance(ours @ turn, theirs),
-                turn_in_words(turn[:3, :3]),
-                fitted,
-                root_turn,
-            )
-        )
+        direct, turned = distance(ours @ turn, theirs), turn_in_words(turn[:3, :3])
+        rows.append(FrameComparison(chain, direct, turned, fitted, root_turn))
     return rows
-
-
-def _for_masters(
-    positions: Mapping[str, Array], chain: Chain, urdf: Urdf
-) -> dict[str, Array]:
-    """Return positions with those of other joints that move the chain's in the robot."""
-    completed = dict(positions)
-    for joint in urdf.path(chain.root_frame, chain.frame_id):
-        if joint.moves and joint.name in positions and joint.moved_by not in positions:
-            completed[joint.moved_by] = (
-                positions[joint.name] - joint.offset
-            ) / joint.gain
-    return completed
-
-
-def _lacks(urdf: Urdf, chain: Chain) -> str:
-    """Return what of a chain a robot lacks; nothing if it can be compared."""
-    for link in (chain.root_frame, chain.frame_id):
-        if link not in urdf.links:
-            return f'the robot has no link {link}'
-    try:
-        path = urdf.path(chain.root_frame, chain.frame_id)
-    except InputFileError as error:
-        return error.fault
-    on_the_way = {joint.name for joint in path} | {joint.moved_by for joint in path}
-    missing = [name for name in chain.joint_names if name not in on_the_way]
-    if missing:
-        return (
-            f'between {chain.root_frame} and {chain.frame_id} the robot has no joint '
-            f'{", ".join(missing)}'
-        )
-    return ''
 
 
 def _nearest_of_each_chain(rows: Sequence[FrameComparison]) -> list[FrameComparison]:
     nearest: dict[str, FrameComparison] = {}
-    for row in rows:
-        best = nearest.setdefault(row.chain.name, row)
-        if row.score < best.score:
-            nearest[row.chain.name] = row
-    return list(nearest.values())
+    for row in sorted(rows, key=lambda row: row.score):
+        nearest.setdefault(row.chain.name, row)
+    return [row for row in rows if row is nearest[row.chain.name]]
 
 
 def _summary(row: FrameComparison, rows: Sequence[FrameComparison]) -> str:
@@ -267,22 +252,17 @@ def _summary(row: FrameComparison, rows: Sequence[FrameComparison]) -> str:
             words += ', and it is another mechanism'
         elif fitted and fitted.mm <= 0.2 * direct.mm:
             words += f', most of it a shift of its ends ({_short(fitted.mm)} mm fitted)'
-    return f'{chain.name}: {words}{_other_axes(row, rows)}'
-
-
-def _other_axes(row: FrameComparison, rows: Sequence[FrameComparison]) -> str:
-    """Return which frames of a version have other axes than the robot's of their name."""
-    words = ''
     for other in rows:
-        is_same = (other.chain.name, other.chain.version) == (
-            row.chain.name,
-            row.chain.version,
-        )
-        if is_same and other.turn:
+        if other.turn and _id(other.chain) == _id(chain):
             words += (
                 f'; its {other.chain.frame_id} has other axes, turned by {other.turn}'
             )
-    return words
+    return f'{chain.name}: {words}'
+
+
+def _id(chain: Chain) -> str:
+    """Return a chain as it is named with its version."""
+    return f'{chain.name}={chain.version}'
 
 
 def _is_near(found: Difference) -> bool:
@@ -290,41 +270,41 @@ def _is_near(found: Difference) -> bool:
 
 
 def _what_to_run(
-    nearest: Sequence[FrameComparison], urdf: Urdf, args: argparse.Namespace
+    nearest: Sequence[FrameComparison], robot: _Robot, args: argparse.Namespace
 ) -> list[str]:
     """Return what to run for this robot, ready to paste."""
     chains = [row.chain for row in nearest]
-    if all(_is_near(row.direct) for row in nearest):
-        named = ', '.join(f'{chain.name}={chain.version}' for chain in chains)
-        file = ''
+    root = robot.root(chains[0])
+    has_same_root = all(chain.root_frame == root for chain in chains)
+    if has_same_root and all(_is_near(row.direct) for row in nearest):
+        parameters = [f'chains:="[{", ".join(map(_id, chains))}]"']
         if args.kinematics_file:
-            file = f' -p kinematics_file:={_absolute(args.kinematics_file)}'
-        return [
-            'The tables are this robot:',
-            f'  {_NODE} \\',
-            f'    -p chains:="[{named}]"{file}',
-        ]
-    robot = Catalog.from_urdf(urdf)
-    output = shlex.quote(f'{Path(args.urdf).stem}.yaml')
-    node, table = '', ''
-    if not {chain.name for chain in chains} <= {*robot.known()}:
+            parameters.append(f'kinematics_file:={_absolute(args.kinematics_file)}')
+        return ['The tables are this robot:', _node(*parameters)]
+    of_node, of_table = [], ''
+    shipped = Catalog.from_urdf(robot.urdf, root=root).known()
+    if not {chain.name for chain in chains} <= {*shipped}:
         tips = [chain.frame_id for chain in chains]
-        root = chains[0].root_frame
-        node = f' -p chains:="[{", ".join(tips)}]" -p root_frame:={root}'
-        table = f' --root {shlex.quote(root)} --tips {shlex.join(tips)}'
+        of_node = [f'chains:="[{", ".join(tips)}]"', f'root_frame:={shlex.quote(root)}']
+        of_table = f' \\\n    --root {shlex.quote(root)} --tips {shlex.join(tips)}'
+    output = shlex.quote(f'{Path(args.urdf).stem}.yaml')
     return [
         "To compute with the robot's own geometry, from its description, from this file, or "
         'from a table of it:',
-        f'  {_NODE} \\',
-        f'    -p description_from_topic:=true{node}',
-        f'  {_NODE} \\',
-        f'    -p kinematics_file:={_absolute(args.urdf)}{node}',
-        f'  leg_fk table {shlex.quote(args.urdf)}{table} -o {output}',
+        _node('description_from_topic:=true', *of_node),
+        _node(f'kinematics_file:={_absolute(args.urdf)}', *of_node),
+        f'  leg_fk table {shlex.quote(args.urdf)}{of_table} -o {output}',
     ]
 
 
+def _node(*parameters: str) -> str:
+    """Return the lines that start the node."""
+    lines = [f'  {_NODE}', *(f'    -p {parameter}' for parameter in parameters)]
+    return ' \\\n'.join(lines)
+
+
 def _absolute(file: str) -> str:
-    return shlex.quote(str(Path(file).resolve()))
+    return shlex.quote(str(Path(file).absolute()))
 
 
 def _short(value: float) -> str:
@@ -333,40 +313,22 @@ def _short(value: float) -> str:
     return f'{value:.0f}' if value >= 10 else f'{value:.2g}'
 
 
-def _table(rows: Sequence[Sequence[str]]) -> list[str]:
-    widths = [max(map(len, column)) for column in zip(_HEADER, *rows, strict=True)]
-    lines = []
-    for cells in (_HEADER, *rows):
-        padded = [
-            cell.rjust(width) if index in _NUMBERS else cell.ljust(width)
-            for index, (cell, width) in enumerate(zip(cells, widths, strict=True))
-        ]
-        lines.append('  '.join(padded).rstrip())
-    return lines
-
-
 def _cells(row: FrameComparison, is_nearest: bool) -> list[str]:
-    fits = ['-', '-']
-    if row.fitted:
-        fits = [_number(row.fitted.mm), _number(row.fitted.deg)]
-    return [
-        row.chain.name,
-        row.chain.version,
-        row.chain.frame_id,
-        _number(row.direct.mm),
-        _number(row.direct.deg),
-        *fits,
-        '<- nearest' if is_nearest else '',
-    ]
+    fits = [row.fitted.mm, row.fitted.deg] if row.fitted else [None, None]
+    numbers = [row.direct.mm, row.direct.deg, *fits]
+    mark = '<- nearest' if is_nearest else ''
+    return [_id(row.chain), row.chain.frame_id, *map(_number, numbers), mark]
 
 
-def _number(value: float) -> str:
+def _number(value: float | None) -> str:
+    if value is None:
+        return ''
     return f'{value:.1f}' if value >= 10 else f'{value:.3f}'
 
 
 def _as_json(row: FrameComparison, is_nearest: bool) -> dict[str, Any]:
     mm, deg = _pairs(row.direct)
-    fitted_mm, fitted_deg = _pairs(row.fitted) if row.fitted else (None, None)
+    fitted_mm, fitted_deg = _pairs(row.fitted)
     return {
         'chain': row.chain.name,
         'version': row.chain.version,
@@ -382,7 +344,10 @@ def _as_json(row: FrameComparison, is_nearest: bool) -> dict[str, Any]:
     }
 
 
-def _pairs(found: Difference) -> tuple[dict[str, float], dict[str, float]]:
+def _pairs(found: Difference | None) -> tuple[dict[str, float] | None, ...]:
+    """Return millimetres and degrees, largest and mean of each."""
+    if found is None:
+        return None, None
     return (
         {'largest': found.mm, 'mean': found.mean_mm},
         {'largest': found.deg, 'mean': found.mean_deg},

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 from icub_leg_fk.kinematics import Chain, ChainEntry
+from icub_leg_fk.kinematics.chain_text import printable
 from icub_leg_fk.tools import options, text
 
 EXAMPLES = """\
@@ -31,7 +32,7 @@ def run(args: argparse.Namespace) -> int:
         return 0
     print(f'chains of {catalog.file}')
     for entry in entries:
-        print(f'\n{entry.name}')
+        print(f'\n{printable(entry.name)}')
         print(*text.indented(_as_text(entry)), sep='\n')
     return 0
 

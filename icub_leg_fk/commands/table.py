@@ -94,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _chains(catalog: Catalog, args: argparse.Namespace) -> list[Chain]:
-    tips = args.tips or catalog.known()
+    tips = args.tips or list(catalog.known())
     if not tips:
         options.refuse_no_chains(catalog)
         raise InputFileError(

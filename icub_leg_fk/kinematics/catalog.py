@@ -103,10 +103,11 @@ class Catalog(Frozen):
         chains = UrdfChains(urdf, start, _shipped_chains(), tolerance)
         return cls(urdf.file, chains, doubts(urdf))
 
-    def known(self) -> list[str]:
-        """Return the names of the shipped chains that a URDF has, or of all chains of a file."""
-        chains = self.chains
-        return chains.known() if isinstance(chains, UrdfChains) else list(chains)
+    def known(self) -> dict[str, str]:
+        """Return the tips of the shipped chains that a URDF has, or of all of a file, by chain."""
+        if isinstance(self.chains, UrdfChains):
+            return self.chains.known()
+        return {name: entry.tip for name, entry in self.chains.items()}
 
     def entry(self, chain: str) -> ChainEntry:
         """Return a chain with all its versions.
@@ -201,9 +202,12 @@ class Catalog(Frozen):
 
     def _owner(self, name: str) -> str:
         """Return whose tip or frame a name is; nothing if it is neither."""
-        for entry in map(self.entry, self.known()):
-            if name == entry.tip:
-                return f'{name} is the tip of {entry.name}'
+        for chain_name, tip in self.known().items():
+            if name == tip:
+                return f'{name} is the tip of {chain_name}'
+        if isinstance(self.chains, UrdfChains):  # whose frames are chains
+            return ''
+        for entry in self.chains.values():
             for chain in entry.versions.values():
                 for frame, tip_frame in chain.tip_frames.items():
                     if name == tip_frame.frame_id:

@@ -21,6 +21,11 @@ def short(value: float, decimals: int = 4) -> str:
     return text.rstrip('0').rstrip('.') if '.' in text else text
 
 
+def printable(text: str) -> str:
+    """Return text with what cannot be printed, such as a tab in a name, as its escape."""
+    return ''.join(char if char.isprintable() else repr(char)[1:-1] for char in text)
+
+
 def position(link: DHLink, value: float) -> str:
     """Return a joint position [rad or m] as `12.5 deg` or, if prismatic, `0.2 m`."""
     if link.is_prismatic:
@@ -51,7 +56,7 @@ def table_rows(chain: Chain) -> list[tuple[str, ...]]:
         rows.append(
             (
                 str(index),
-                row.joint or '(fixed)',
+                printable(row.joint) or '(fixed)',
                 short(1000 * link.a, 6),
                 d,
                 short(math.degrees(link.alpha), 6),
@@ -85,7 +90,7 @@ def as_html(chain: Chain) -> str:
 
 
 def _title(chain: Chain) -> str:
-    return (
+    return printable(
         f'{chain.name} {chain.version}: {chain.root_frame} to {chain.frame_id}, '
         f'{chain.convention} Denavit-Hartenberg table in mm, deg'
     )

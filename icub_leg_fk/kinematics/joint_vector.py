@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 JointVector = Sequence[float] | Mapping[str, float] | Array
 
-_KINDS = {'U': 'text', 'S': 'bytes', 'O': 'objects', 'c': 'complex numbers'}
+_KINDS = {'U': 'text', 'S': 'bytes', 'c': 'complex numbers'}
 _SHAPES = {1: '({n},)', 2: '(N, {n})', None: '(..., {n})'}
 
 
@@ -92,6 +92,8 @@ def _values(q: ArrayLike, name: str, allowed: str) -> Array:
     """Return an array of real numbers in float64."""
     try:
         values = np.asarray(q)
+        if values.ndim and values.dtype == object:  # such as Decimal or Fraction
+            values = np.reshape(array('d', values.ravel()), values.shape)
     except (OverflowError, TypeError, ValueError) as error:
         fault = (
             f'is {_type_in_words(q)} whose parts differ in length, or are not numbers'

@@ -257,12 +257,13 @@ class _FileReader:
     def _links(self, at: Field, joint_names: Sequence[str]) -> list[DHLink]:
         links = []
         has_range: set[str] = set()
-        for index, row in enumerate(at.items('a list of rows')):
+        rows = at.at('field links').items('a list of rows')
+        for index, item in enumerate(rows):
+            row = Field(at.file, f'{at.where}, row {index}', item.node)
             self._rows_read += 1
             if self._rows_read > _MOST_ROWS:
                 at.fail(f'at most {_MOST_ROWS} in a file', 'too many rows')
-            link = self._link(row.at(f'row {index}'), joint_names, has_range)
-            links.append(link)
+            links.append(self._link(row, joint_names, has_range))
         named = {link.joint for link in links if link.joint}
         unnamed_rows = sum(not link.is_fixed and not link.joint for link in links)
         unnamed_joints = sum(name not in named for name in joint_names)

@@ -57,9 +57,7 @@ class UrdfChains(Mapping[str, ChainEntry]):
         return self._made[name]
 
     def __iter__(self) -> Iterator[str]:
-        for name in self._known:
-            if self._known_frames(name):
-                yield name
+        yield from self.known()
         for link in self._urdf.ends():
             if self._moves(link):
                 yield link
@@ -67,9 +65,12 @@ class UrdfChains(Mapping[str, ChainEntry]):
     def __len__(self) -> int:
         return sum(1 for _ in self)
 
-    def known(self) -> list[str]:
-        """Return the names of the known chains that the robot has."""
-        return [name for name in self._known if self._known_frames(name)]
+    def known(self) -> dict[str, str]:
+        """Return the tips of the known chains that the robot has, by chain."""
+        entries = self._known.values()
+        return {
+            entry.name: entry.tip for entry in entries if self._known_frames(entry.name)
+        }
 
     def _entry(self, name: str) -> ChainEntry:
         frames = self._known_frames(name)

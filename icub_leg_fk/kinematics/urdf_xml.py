@@ -19,6 +19,7 @@ import yaml
 REPLACEMENT = '\N{REPLACEMENT CHARACTER}'
 """What stands where a byte is not UTF-8 text; a name that has it cannot be used."""
 
+_OLD_XACRO = ('include', 'macro', 'property')  # before ROS Jade they had no prefix
 _CUT_OFF = 140  # characters; `ros2 topic echo` prints 128 of a text, and three points
 
 _ECHOED = re.compile(rb'(?:^|\n)data: *(?:["\']|[|>][-+0-9]*\s*)?$')
@@ -137,7 +138,8 @@ def _echoed(data: bytes, file: str) -> str:
 
 def _refuse_other_formats(robot: etree._Element, file: str) -> None:
     for element in robot.iter(etree.Element):
-        if tag(element).startswith('xacro:'):
+        is_old = element.getparent() is robot and tag(element) in _OLD_XACRO
+        if is_old or tag(element).startswith('xacro:'):
             raise InputFileError(
                 file,
                 f'is a xacro file; this makes a URDF of it: xacro {file} > robot.urdf',

@@ -142,7 +142,9 @@ class Field:
         if not isinstance(self.node, yaml.SequenceNode):
             self.fail(content)
         count = len(self.node.value)
-        if count == 0 or (length is not None and count != length):
+        if count == 0:
+            self.fail(f'{content}, at least one', 'an empty list')
+        if length is not None and count != length:
             self.fail(content, f'{count} item{"s" * (count != 1)}')
         for item in self.node.value:
             yield Field(self.file, self.where, item)

@@ -8,7 +8,7 @@ from typing import Any
 
 from icub_leg_fk.errors import LegFKError
 from icub_leg_fk.kinematics import Chain
-from icub_leg_fk.kinematics.chain_text import joint_range, position
+from icub_leg_fk.kinematics.chain_text import joint_range, position, printable
 
 WIDTH = 98
 _UNLIKELY = 10.0  # m; of a joint's position, which may have been meant in mm
@@ -55,7 +55,8 @@ def columns(
     aligned = [_aligned(column) for column in zip(*rows, strict=True)]
     if header:
         aligned = [_padded([title, *column]) for title, column in zip(header, aligned)]
-    return [gap.join(cells).rstrip() for cells in zip(*aligned, strict=True)]
+    lines = [gap.join(cells).rstrip() for cells in zip(*aligned, strict=True)]
+    return [printable(line) for line in lines]
 
 
 def matrix(rows: Sequence[Sequence[str]], gap: str = ' ') -> list[str]:

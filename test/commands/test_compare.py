@@ -120,6 +120,19 @@ def test_a_turned_root_is_told_from_another_robot(
     )
 
 
+def test_the_root_of_the_robot_may_have_another_name(tmp_path: Path) -> None:
+    file = tmp_path / 'legs.urdf'
+    assert run_main('urdf', 'left_leg', 'right_leg', '-o', file).returncode == 0
+    file.write_text(file.read_text().replace('"root_link"', '"base_link"'))
+    done = run_main('compare', file, '--root', 'base_link', '--json')
+    found = json.loads(done.stdout)
+    assert found['advice'][0].startswith('left_leg: use v2_5, which is this robot')
+    assert '-p root_frame:=base_link' in found['advice'][-2] and not done.stderr
+    assert '--root base_link --tips l_foot_dh_frame r_foot' in found['advice'][-1]
+    unknown = run_main('compare', file, '--root', 'base_lnk')
+    assert_one_line_complaint(unknown, "did you mean 'base_link'?")
+
+
 def test_no_chain_is_dropped_without_its_reason(tmp_path: Path) -> None:
     file = tmp_path / 'legs.urdf'
     assert run_main('urdf', 'left_leg', 'right_leg', '-o', file).returncode == 0
@@ -161,7 +174,7 @@ def test_a_robot_without_the_joints_says_what_it_has(tmp_path: Path) -> None:
     file.write_text(robot([joint(0, 'continuous')]))
     assert_one_line_complaint(
         run_main('compare', file),
-        'cannot be compared: left_leg: the robot has no link root_link; right_leg: ',
+        'left_leg, right_leg, head_imu: not compared: the robot has no link root_link; --root ',
     )
     assert_one_line_complaint(
         run_main('compare', file, '--chains', 'left_lag'), "did you mean 'left_leg'?"

@@ -5,6 +5,7 @@ import json
 from icub_leg_fk.kinematics import config_file
 import pytest
 from support.leg_fk_process import assert_one_line_complaint, run_main
+from support.robots import joint, robot
 
 ARM = config_file('examples/cylindrical_arm.yaml')
 
@@ -82,6 +83,14 @@ def test_a_file_of_ones_own_is_listed():
     assert (
         'axes' not in run_main('list', '-k', ARM).stdout
     )  # of which the file says nothing
+
+
+def test_names_that_cannot_be_printed_are_shown_as_escapes(tmp_path):
+    file = tmp_path / 'odd.urdf'
+    odd = robot([joint(0)]).replace('j0', 'j&#9;0').replace('"l1"', '"l&#10;1"')
+    file.write_text(odd)
+    text = run_main('list', '-k', file).stdout
+    assert '\nl\\n1\n' in text and 'l_1: l\\n1\n' in text and text.endswith('j\\t0\n')
 
 
 @pytest.mark.parametrize(

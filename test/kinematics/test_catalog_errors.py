@@ -181,8 +181,8 @@ MISTAKES = {
         '[]',
         6,
         f'{LEG}, field joints',
-        '0 items',
-        'a list of joint names',
+        'an empty list',
+        'a list of joint names, at least one',
     ),
     'two chains with one tip': (
         GOOD,
@@ -355,6 +355,14 @@ MISTAKES = {
         f'{V1}, field links',
         '1 row with a joint',
         '2, one per joint that no row names',
+    ),
+    'no rows': (
+        GOOD[GOOD.index('        links:') : GOOD.index('        T_nIs')],
+        '        links: []\n',
+        20,
+        f'{V1}, field links',
+        'an empty list',
+        'a list of rows, at least one',
     ),
     'cell missing': ('d: 20, ', '', 21, f'{ROW_0}, field d', 'nothing', f'all of {DH}'),
     'unknown cell': (

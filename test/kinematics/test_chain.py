@@ -1,6 +1,8 @@
 """Properties of any chain: random tables, rows that follow, sliding joints, odd twists."""
 
 import copy
+from decimal import Decimal
+from fractions import Fraction
 from math import inf, nan, pi
 import pickle
 import tracemalloc
@@ -195,6 +197,7 @@ NOT_NUMBERS = [
     [0.0, 0.0, nan, 0.0, 0.0, 0.0],
     [inf] + [0.0] * 5,
     [None] * 6,
+    [Decimal(1), '2'] * 3,
     ['0'] * 6,
     ['a\nb'] * 6,
     [1j] * 6,
@@ -266,6 +269,8 @@ def test_a_bad_entry_is_named_by_its_place(value: float) -> None:
         np.longdouble,
         np.int64,
         np.uint8,
+        Decimal,
+        Fraction,
     ],
 )
 @pytest.mark.parametrize('several', [list, tuple, np.array])

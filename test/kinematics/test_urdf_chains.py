@@ -7,6 +7,7 @@ from icub_leg_fk.errors import InputFileError, LegFKError, UnknownNameError
 from icub_leg_fk.kinematics import Catalog, load_chain, Urdf
 from icub_leg_fk.kinematics.difference import difference, postures
 from icub_leg_fk.kinematics.table_from_urdf import TIDY
+from icub_leg_fk.tools.urdf_text import urdf_text
 import numpy as np
 import pytest
 from support.robots import joint, robot
@@ -63,6 +64,16 @@ def test_chains_whose_topics_would_have_one_name_are_not_used_together(
         Catalog.load(file).select(['the tool [x]', 'the_tool__x_'])
 
 
+def test_a_tip_given_as_a_chain_is_answered_without_a_table_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / 'icub.urdf'
+    file.write_text(urdf_text('icub', Catalog.load().select(['left_leg'])))
+    monkeypatch.delattr('icub_leg_fk.kinematics.urdf_chains.chain_from_urdf')
+    with pytest.raises(UnknownNameError, match='left_foot is the tip of left_leg'):
+        Catalog.load(file).chain('left_foot')
+
+
 def test_another_root_may_be_named(arm: Path) -> None:
     assert load_chain('l2', file=arm, root='l1').joint_names == ('j1',)
     with pytest.raises(UnknownNameError, match=r"unknown link 'l9' of .*; .*known: l4"):
@@ -93,7 +104,7 @@ def test_the_legs_go_by_their_names_with_both_frames(robot_name: str) -> None:
     assert (
         list(catalog.chains)[:3]
         == ['left_leg', 'right_leg', 'head_imu']
-        == catalog.known()
+        == [*catalog.known()]
     )
     leg, shipped = catalog.chain('left_leg'), load_chain('left_leg')
     assert (leg.tip, leg.root_frame, [*leg.tip_frames], leg.joint_names) == (
@@ -130,7 +141,7 @@ def test_an_icub_3_has_only_its_soles() -> None:
 def test_a_root_that_is_not_the_shipped_one_has_no_shipped_chains() -> None:
     file = SHARED / 'data' / 'urdf' / 'iCubGenova04.urdf'
     catalog = Catalog.load(file, root='l_hip_1')
-    assert catalog.known() == [] and 'left_leg' not in catalog.chains
+    assert not catalog.known() and 'left_leg' not in catalog.chains
     assert catalog.chain('l_sole').n < 6
 
 

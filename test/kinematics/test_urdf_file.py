@@ -526,6 +526,12 @@ REFUSED = {
         'b',
         'is a xacro file',
     ),
+    'xacro of old': (
+        '<robot name="a"><property name="mass" value="1"/></robot>',
+        'a',
+        'b',
+        'is a xacro file',
+    ),
     'sdf': ('<sdf/>', 'a', 'b', 'is not a URDF: its root is <sdf>'),
 }
 
