@@ -137,7 +137,7 @@ def _echoed(data: bytes, file: str) -> str:
 
 def _refuse_other_formats(robot: etree._Element, file: str) -> None:
     for element in robot.iter(etree.Element):
-        if tag(element).startswith('xacro:'):
+        if tag(element).startswith('xacro:') or tag(element) == 'macro':
             raise InputFileError(
                 file,
                 f'is a xacro file; this makes a URDF of it: xacro {file} > robot.urdf',
