@@ -30,6 +30,7 @@ TEST = [
     'cyclonedds>=11,<12',
     'distributed',
     'example-robot-data',
+    'h5py',
     'hypothesis',
     'icub-models',
     'mcap',

@@ -1,7 +1,11 @@
 """`leg_fk explain`: how the pose of a chain follows from its Denavit-Hartenberg table."""
 
 import argparse
+from dataclasses import replace
 
+from icub_leg_fk.kinematics import Catalog, Chain
+from icub_leg_fk.kinematics.difference import difference, postures
+from icub_leg_fk.kinematics.table_from_urdf import TIDY
 from icub_leg_fk.tools import options
 from icub_leg_fk.tools.explanation import explain
 from icub_leg_fk.tools.explanation_json import as_json
@@ -10,13 +14,16 @@ from icub_leg_fk.tools.explanation_text import as_text
 
 EXAMPLES = """\
 Without joint positions the answer is a formula in q_0, q_1, ... Lengths are mm, as in printed
-tables.
+tables. The table of a URDF is tidied as by leg_fk table, and what that costs is reported.
 
 examples:
   leg_fk explain left_leg --degrees 0 10 0 -30 -15 5
   leg_fk explain left_leg
   leg_fk explain head_imu=v2 --degrees 0 0 0 30 0 45 --symbolic
-  leg_fk explain arm -k cylindrical_arm.yaml --latex > arm.tex"""
+  leg_fk explain arm -k cylindrical_arm.yaml --latex > arm.tex
+  leg_fk explain left_leg -k icub.urdf"""
+
+_SAMPLES = 1000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the explanation."""
-    chain = options.chosen_chain(args)
+    chain = _chain_for_people(args)
     explanation = explain(
         chain, options.joint_positions(args, chain), exact=args.symbolic
     )
@@ -48,3 +55,17 @@ def run(args: argparse.Namespace) -> int:
     else:
         print(as_text(explanation))
     return 0
+
+
+def _chain_for_people(args: argparse.Namespace) -> Chain:
+    """Return the chain; that of a URDF with a tidied table, whose source has what that costs."""
+    catalog = options.load_catalog(args, tolerance=TIDY)
+    chain = catalog.chain(args.chain, args.version, args.foot_frame)
+    exact = Catalog.load(args.kinematics_file, root=args.root).chain(
+        chain.name, chain.version, chain.frame
+    )
+    if chain == exact:
+        return chain
+    found = difference(chain.forward, exact.forward, postures(chain, _SAMPLES))
+    cost = f'at most {found.mm:.4f} mm, {found.deg:.4f} deg in {_SAMPLES} postures'
+    return replace(chain, source=f'{chain.source}, tidied, which costs {cost}')

@@ -14,6 +14,7 @@ import os
 from pathlib import Path
 import re
 import sqlite3
+import sys
 import tempfile
 from types import ModuleType
 from typing import Any
@@ -344,7 +345,8 @@ def _notes_on_counts(
 def _unreadable(path: Path, error: Exception) -> InputFileError:
     """Return the one line on a recording that rosbags cannot read, with what mends it."""
     reason = ' '.join(str(error).split()).rstrip('.') or type(error).__name__
-    if isinstance(error, UnicodeError):
+    is_other_name = not reason.isascii() and sys.getfilesystemencoding() != 'utf-8'
+    if isinstance(error, UnicodeError) or is_other_name:
         mend = 'where the locale is not UTF-8, set PYTHONUTF8=1'
     elif path.is_dir():
         reason, mend = _reason_and_mend(path, reason)

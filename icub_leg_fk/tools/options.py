@@ -90,15 +90,22 @@ def number_between(
     return parse
 
 
-def load_catalog(args: argparse.Namespace) -> Catalog:
-    """Return the catalog that `-k` names, with a line on stderr for each of its warnings."""
+def load_catalog(args: argparse.Namespace, *, tolerance: float = 0.0) -> Catalog:
+    """Return the catalog that `-k` names, with a line on stderr for each of its warnings.
+
+    Args:
+        args: the options.
+        tolerance: of a URDF, angle up to which its tables are tidied for people [rad].
+    """
     for option in ('kinematics_file', 'root', 'version', 'foot_frame'):
         if (
             getattr(args, option, None) == ''
         ):  # as an unset variable of the shell leaves it
             words = option.replace('_', '-')
             raise LegFKError(f'--{words} is empty; leave it out for its default')
-    catalog = Catalog.load(args.kinematics_file, root=getattr(args, 'root', None))
+    catalog = Catalog.load(
+        args.kinematics_file, root=getattr(args, 'root', None), tolerance=tolerance
+    )
     for line in catalog.warnings:
         print(f'leg_fk: warning: {line}', file=sys.stderr)
     return catalog
