@@ -176,8 +176,9 @@ class Description:
                 WARNING,
                 f'publish_tf sends {" and ".join(shared)}, '
                 f'which the description on {self.topic} has, so that robot_state_publisher '
-                'sends it, too: leave publish_tf off, or set a frame_prefix, which is not '
-                'part of a description',
+                'sends the same, fixed frames on /tf_static, and what comes on /tf '
+                'displaces those: leave publish_tf off, or set a frame_prefix, which is '
+                'not part of a description',
             )
         ]
 
