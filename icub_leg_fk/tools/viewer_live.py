@@ -66,7 +66,7 @@ class LiveJoints:
             look = self._input.take_look()
         self._notes = notes_of(look, self._topic)
         if not look.messages:
-            self._notes = [Note('no_message', '', '', f'no message on {self._topic}')]
+            self._notes = [Note('no_message', f'no message on {self._topic}')]
 
     def postures(self) -> list[Posture]:
         """Return the joints of every chain as they came last."""
