@@ -51,7 +51,7 @@ BAD = {
     f'-p {QOS}.reliability:=sure': "found 'sure', allowed: system_default or reliable or",
     f'-p {QOS}.depth:=-4': 'found -4, allowed: an integer from 1',
     f'-p {QOS}.depth:=many': "found 'many', allowed: an integer",
-    f'-p {QOS}.dept:=4': 'no such policy; allowed: depth, history',
+    f'-p {QOS}.dept:=4': "unknown policy in qos_overrides 'dept'; did you mean 'depth'? known",
     '-p qos_overrides./joint_state.subscription.depth:=4': "did you mean '/joint_states'?",
     '-p qos_overrides./joint_states.publisher.depth:=4': "'publisher'; known: subscription",
     '-p version=v1': "unknown argument '-p version=v1'; did you mean -p version:=v1?",
@@ -74,6 +74,7 @@ OTHERS_PARAMETERS = {
     'qos_overrides./tf.publisher.depth': 10,
     'qos_overrides./clock.subscription.depth': 5,
     'qos_overrides./joint_states.publisher.depth': 7,
+    'qos_overrides./joint_states.subscription.liveliness': 'automatic',
     'qos_overrides./robot_description.publisher.durability': 'volatile',
 }
 
@@ -174,7 +175,7 @@ def test_files_for_all_nodes_and_for_others_are_no_reason_not_to_start(tmp_path)
     )
     others.write_text('/other/foot_pose_publisher: {ros__parameters: {version: v3}}\n')
     files = ['--params-file', str(everybodys), '--params-file', str(others)]
-    with NodeProcess(arguments=files) as node:
+    with NodeProcess(arguments=files, namespace='') as node:
         node.wait_for_log('publishing poses of left_foot (left_leg=v1,')
         log = node.log()
     warnings = [
