@@ -7,7 +7,7 @@ from icub_leg_fk.node.qos_overrides import OVERRIDABLE
 from icub_leg_fk.stream.configuration import Configuration
 from icub_leg_fk.stream.description import Description
 from icub_leg_fk.stream.joint_input import JointInput
-from icub_leg_fk.stream.notes import INFO, Note, WARNING
+from icub_leg_fk.stream.notes import INFO, Note
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -75,16 +75,13 @@ class FootPosePublisher(Node):
         )
         self._outputs.configure(configuration)
         self._description.configure(configuration)
-        self._health.configure(configuration)
-        self._announce()
+        self._announce(configuration)
 
-    def _announce(self) -> None:
-        notes = _announcement(
-            self._node_parameters.configuration,
-            self._joint_states.topic_name,
-            self._description.topic,
-        )
-        self._health.announce(notes + self._description.announcement())
+    def _announce(self, configuration: Configuration) -> None:
+        topics = self._joint_states.topic_name, self._description.topic
+        notes = _announcement(configuration, *topics)
+        notes += self._description.announcement()
+        self._health.configure(configuration, notes)
 
     def _take(self, data: bytes) -> None:
         """Take one serialized JointState in and publish what it makes ready."""
@@ -95,7 +92,7 @@ class FootPosePublisher(Node):
     def _take_description(self, data: bytes) -> None:
         """Take one serialized description of the robot in, and say what follows from it."""
         self._description.take(data)
-        self._announce()
+        self._announce(self._node_parameters.configuration)
         self._health.say_announcement()
 
 
@@ -109,7 +106,6 @@ def _announcement(
         topic: the topic of the joint states.
         description_topic: the topic of the robot's description.
     """
-    notes = [Note('kinematics', '', WARNING, text) for text in configuration.warnings]
     kinds = _kinds(configuration)
     if configuration.awaited:
         doing = (
@@ -118,19 +114,20 @@ def _announcement(
         )
     else:
         doing = f'publishing {kinds} of {_chains(configuration)}'
-    texts = [*configuration.notes, f'{doing}; joint states from {topic}']
-    return notes + [Note('configuration', '', INFO, text) for text in texts]
+    notes = [Note('kinematics', text) for text in configuration.warnings]
+    for text in (*configuration.notes, f'{doing}; joint states from {topic}'):
+        notes.append(Note('configuration', text, level=INFO))
+    return notes
 
 
 def _kinds(configuration: Configuration) -> str:
-    kinds = ['poses']
-    if configuration.publish_twist:
-        kinds.append('twists')
-    if configuration.publish_tf:
-        kinds.append('transforms')
-    if configuration.publish_markers:
-        kinds.append('skeletons')
-    *first, last = kinds
+    wanted = {
+        'poses': True,
+        'twists': configuration.publish_twist,
+        'transforms': configuration.publish_tf,
+        'skeletons': configuration.publish_markers,
+    }
+    *first, last = [kind for kind, is_wanted in wanted.items() if is_wanted]
     return f'{", ".join(first)} and {last}' if first else last
 
 

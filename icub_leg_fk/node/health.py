@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
 import time
 from typing import Any, NamedTuple
 
@@ -15,12 +14,13 @@ from icub_leg_fk.stream.configuration import Configuration
 from icub_leg_fk.stream.description import Description, UNUSABLE
 from icub_leg_fk.stream.joint_input import (
     ChainLook,
+    HOLD_BACK,
     JointInput,
     Look,
     REJECTIONS,
     TIME_JUMP,
 )
-from icub_leg_fk.stream.notes import ERROR, INFO, joints_found, Note, notes_of, WARNING
+from icub_leg_fk.stream.notes import ERROR, INFO, joints_found, Note, notes_of
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
@@ -79,36 +79,17 @@ class Surroundings(NamedTuple):
         return f'{count or "no"} publisher{"s" * (count > 1)}'
 
 
-@dataclass
-class Totals:
-    """What has happened since the start.
+class Totals(defaultdict[str, Counter[str]]):
+    """What has been counted since the start, by chain; of all messages under an empty name."""
 
-    Attributes:
-        messages: messages received.
-        rejected: messages rejected, by reason.
-        ready: joint vectors that went out, by chain.
-        held_back: messages that gave no pose or twist, by chain and reason.
-    """
-
-    messages: int = 0
-    rejected: Counter[str] = field(default_factory=Counter)
-    ready: Counter[str] = field(default_factory=Counter)
-    held_back: dict[str, Counter[str]] = field(default_factory=dict)
+    def __init__(self) -> None:
+        super().__init__(Counter)
 
     def add(self, look: Look) -> None:
         """Add what has happened since the last look."""
-        self.messages += look.messages
-        self.rejected.update(look.rejected)
+        self[''].update(look.rejected, messages=look.messages)
         for name, chain_look in look.chains.items():
-            self.ready[name] += chain_look.ready
-            self.held_back.setdefault(name, Counter()).update(chain_look.held_back)
-
-    def values(self, chain: str) -> dict[str, int]:
-        """Return what diagnostics show of a chain."""
-        values = {'messages': self.messages, 'poses': self.ready[chain]}
-        for reason in (*REJECTIONS, TIME_JUMP):
-            values[reason] = self.rejected[reason]
-        return values | dict(sorted(self.held_back[chain].items()))
+            self[name].update(chain_look.held_back, poses=chain_look.ready)
 
 
 class Health:
@@ -138,16 +119,15 @@ class Health:
             _PERIOD, self._show, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
 
-    def configure(self, configuration: Configuration) -> None:
-        """Take in what is published."""
-        self._configuration = configuration
-
-    def announce(self, notes: Sequence[Note]) -> None:
-        """Take what there is to say of the configuration; the next look says it.
+    def configure(
+        self, configuration: Configuration, announcement: Sequence[Note]
+    ) -> None:
+        """Take in what is published, and what there is to say of it; the next look says it.
 
         `ros2 param load` sets one parameter after the other.
         """
-        self._announcement = notes
+        self._configuration = configuration
+        self._announcement = announcement
 
     def say_announcement(self) -> None:
         """Say what is new of the configuration."""
@@ -165,43 +145,40 @@ class Health:
         if look.messages:
             self._last_message = now
         around = self._surroundings(silence=now - self._last_message)
+        describers = self._publishers_of(self._description.topic, STRING)
         notes = [
             *notes_around(look, around, self._totals),
             *notes_of(look, self._topic, self._configuration.joint_prefix),
-            *self._description.notes(
-                self._publishers_of(self._description.topic, STRING)
-            ),
+            *self._description.notes(describers),
         ]
         self._totals.add(look)
         self._log.show(notes, look)
         array = DiagnosticArray()
         array.header.stamp = self._node.get_clock().now().to_msg()
-        for chain_look in look.chains.values():
-            chain = chain_look.chain
-            status = self._status(chain.name, *verdict(look, chain_look, notes))
-            status.hardware_id = f'{chain.name}={chain.version}'
-            status.values = self._values(chain_look, period, around)
+        for name in (*look.chains, *self._configuration.awaited):
+            level, message = verdict(look, name, notes)
+            status = DiagnosticStatus(level=level, message=message)
+            status.name = f'{around.name.lstrip("/")}: {name}'
+            if name in look.chains:
+                chain_look = look.chains[name]
+                status.hardware_id = f'{name}={chain_look.chain.version}'
+                status.values = self._values(chain_look, period, around)
             array.status.append(status)
-        for name in self._configuration.awaited:
-            array.status.append(self._status(name, *verdict_of_waiting(notes)))
         self._publisher.publish(array)
 
     def _surroundings(self, silence: float) -> Surroundings:
         """Return what is around the node."""
         node = self._node
-        publishers = self._publishers_of(self._topic, JOINT_STATE)
         infos = node.get_publishers_info_by_topic(self._topic)
-        other_types = [
-            info.topic_type for info in infos if info.topic_type != JOINT_STATE
-        ]
+        types = {info.topic_type for info in infos}
         pose_publishers = []
         for chain in self._input.chains[:1]:
             own_topic = node.resolve_topic_name(pose_topic(chain))
             pose_publishers = self._publishers_of(own_topic, POSE_STAMPED)
         return Surroundings(
             topic=self._topic,
-            publishers=publishers,
-            other_types=sorted(other_types),
+            publishers=self._publishers_of(self._topic, JOINT_STATE),
+            other_types=sorted(types - {JOINT_STATE}),
             silence=silence,
             has_time=node.get_clock().now().nanoseconds > 0,
             name=node.get_fully_qualified_name(),
@@ -212,13 +189,10 @@ class Health:
         """Return the full names of the nodes that publish messages of a type on a topic."""
         infos = self._node.get_publishers_info_by_topic(topic)
         return sorted(
-            _full_name(info) for info in infos if info.topic_type == message_type
+            f'{info.node_namespace.rstrip("/")}/{info.node_name}'
+            for info in infos
+            if info.topic_type == message_type
         )
-
-    def _status(self, chain: str, level: bytes, message: str) -> DiagnosticStatus:
-        """Return the status of a chain, without values."""
-        name = self._node.get_fully_qualified_name().lstrip('/')
-        return DiagnosticStatus(level=level, name=f'{name}: {chain}', message=message)
 
     def _values(
         self, chain_look: ChainLook, period: float, around: Surroundings
@@ -227,6 +201,7 @@ class Health:
         chain = chain_look.chain
         stamps = self._input.held_stamps(chain).values()
         now = self._node.get_clock().now().nanoseconds
+        of_all, of_chain = self._totals[''], self._totals[chain.name]
         values = {
             'version': chain.version,
             'rate (Hz)': f'{chain_look.ready / period:.1f}',
@@ -234,8 +209,14 @@ class Health:
             'topic': self._topic,
             'publishers': len(around.publishers),
             'description': self._description.value(chain.name),
-            **self._totals.values(chain.name),
+            'messages': of_all['messages'],
+            'poses': of_chain['poses'],
         }
+        for reason in (*REJECTIONS, TIME_JUMP):
+            values[reason] = of_all[reason]
+        for reason in HOLD_BACK:
+            if reason in of_chain:
+                values[reason] = of_chain[reason]
         for reason, joints in sorted(chain_look.joints.items()):
             values[f'{reason} joints'] = joints_found(reason, joints)
         return [KeyValue(key=key, value=str(value)) for key, value in values.items()]
@@ -284,118 +265,68 @@ class HealthLog:
             return False
         if note.key == TIME_JUMP:
             return True
-        return self._looks[note.key, note.chain] == (
-            PATIENCE if note.key in _PATIENT else 1
-        )
+        patience = PATIENCE if note.key in _PATIENT else 1
+        return self._looks[note.key, note.chain] == patience
 
 
-def notes_around(look: Look, around: Surroundings, before: Totals) -> list[Note]:
-    """Return what there is to say of the node's surroundings.
+def notes_around(look: Look, around: Surroundings, before: Totals) -> Iterator[Note]:
+    """Yield what there is to say of the node's surroundings.
 
     Args:
         look: what has happened since the last look.
         around: what is around the node.
         before: what had happened until then.
     """
-    return [
-        *_of_silence(look, around, before),
-        *_of_the_start(look, around, before),
-        *_of_publishers(look, around),
-        *_of_clock_and_name(around),
-    ]
-
-
-def verdict(
-    look: Look, chain_look: ChainLook, notes: Sequence[Note]
-) -> tuple[bytes, str]:
-    """Return level and message of a chain's status."""
-    concerned = [note for note in notes if note.chain in ('', chain_look.chain.name)]
-    has_error, message = _summary(concerned)
-    if has_error:
-        return DiagnosticStatus.ERROR, message
+    count = around.publisher_count()
     if look.messages == 0:
-        return DiagnosticStatus.STALE, message
-    if chain_look.ready == 0:
-        return (
-            DiagnosticStatus.ERROR,
-            message or 'no message with a position of its joints',
+        messages = before['']['messages']
+        counted = f', {messages} before' if messages else ''
+        text = (
+            f'no JointState received on {around.topic} for {around.silence:.0f} s{counted}'
+            f'; it has {count}'
         )
+        yield Note('silence', text)
+    for name, chain_look in look.chains.items():
+        if chain_look.ready and not before[name]['poses']:
+            text = f'first pose of {chain_look.chain.tip}; {count} on {around.topic}'
+            yield Note(f'first pose of {name}', text, level=INFO)
+    if look.messages > 1 and len(around.publishers) > 1:
+        yield Note('publishers', f'{count} on {around.topic}', level=INFO)
+        yield from _of_same_joints(look, around)
+    if not around.has_time:
+        yield Note('no_clock', 'use_sim_time is set, but no time has come on /clock')
+    if around.pose_publishers.count(around.name) > 1:
+        text = (
+            f'another node is called {around.name} and publishes the same topics; give one '
+            'of them another name: --ros-args -r __node:=NAME'
+        )
+        yield Note('same_name', text)
+
+
+def _of_same_joints(look: Look, around: Surroundings) -> Iterator[Note]:
+    """Warn if several publishers seem to bring the joints of one chain."""
+    for name, chain_look in look.chains.items():
+        if chain_look.ready + chain_look.silent == look.messages:
+            text = (
+                f'every message on {around.topic} brings its joints, and it has '
+                f'{around.publisher_count()}: {", ".join(around.publishers)}'
+            )
+            yield Note('same_joints', text, name)
+
+
+def verdict(look: Look, chain: str, notes: Sequence[Note]) -> tuple[bytes, str]:
+    """Return level and message of the status of a chain, which may wait for a description."""
+    serious = [
+        note for note in notes if note.chain in ('', chain) and note.level != INFO
+    ]
+    message = '; '.join(note.text for note in serious)
+    if any(note.level == ERROR for note in serious):
+        return DiagnosticStatus.ERROR, message
+    if look.messages == 0 or chain not in look.chains:
+        return DiagnosticStatus.STALE, message
+    if look.chains[chain].ready == 0:
+        nothing = 'no message with a position of its joints'
+        return DiagnosticStatus.ERROR, message or nothing
     if message:
         return DiagnosticStatus.WARN, message
     return DiagnosticStatus.OK, 'publishing'
-
-
-def verdict_of_waiting(notes: Sequence[Note]) -> tuple[bytes, str]:
-    """Return level and message of the status of a chain that waits for a description."""
-    has_error, message = _summary(notes)
-    return DiagnosticStatus.ERROR if has_error else DiagnosticStatus.STALE, message
-
-
-def _summary(notes: Sequence[Note]) -> tuple[bool, str]:
-    """Return whether there is an error among some notes, and all that is more than information."""
-    serious = [note for note in notes if note.level != INFO]
-    has_error = any(note.level == ERROR for note in serious)
-    return has_error, '; '.join(note.text for note in serious)
-
-
-def _of_silence(look: Look, around: Surroundings, before: Totals) -> Iterator[Note]:
-    if look.messages == 0:
-        counted = f', {before.messages} before' if before.messages else ''
-        yield Note(
-            'silence',
-            '',
-            WARNING,
-            f'no JointState received on {around.topic} for {around.silence:.0f} s{counted}'
-            f'; it has {around.publisher_count()}',
-        )
-
-
-def _of_the_start(look: Look, around: Surroundings, before: Totals) -> Iterator[Note]:
-    for name, chain_look in look.chains.items():
-        if chain_look.ready and not before.ready[name]:
-            yield Note(
-                f'first pose of {name}',
-                '',
-                INFO,
-                f'first pose of {chain_look.chain.tip}; {around.publisher_count()} on '
-                f'{around.topic}',
-            )
-
-
-def _of_publishers(look: Look, around: Surroundings) -> Iterator[Note]:
-    """Warn if two publishers seem to bring the joints of one chain."""
-    if look.messages < 2 or len(around.publishers) < 2:
-        return
-    yield Note('publishers', '', INFO, f'{around.publisher_count()} on {around.topic}')
-    for name, chain_look in look.chains.items():
-        if chain_look.ready + chain_look.silent == look.messages:
-            yield Note(
-                'same_joints',
-                name,
-                WARNING,
-                f'every message on {around.topic} brings its joints, and it has '
-                f'{around.publisher_count()}: {", ".join(around.publishers)}',
-            )
-
-
-def _of_clock_and_name(around: Surroundings) -> Iterator[Note]:
-    if not around.has_time:
-        yield Note(
-            'no_clock',
-            '',
-            WARNING,
-            'use_sim_time is set, but no time has come on /clock',
-        )
-    if around.pose_publishers.count(around.name) > 1:
-        yield Note(
-            'same_name',
-            '',
-            WARNING,
-            f'another node is called {around.name} and publishes the same topics; give one '
-            'of them another name: --ros-args -r __node:=NAME',
-        )
-
-
-def _full_name(info: Any) -> str:
-    """Return the full name of the node that an endpoint belongs to."""
-    return f'{info.node_namespace.rstrip("/")}/{info.node_name}'

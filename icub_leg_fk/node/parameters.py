@@ -12,9 +12,8 @@ from typing import Any, NamedTuple
 from icub_leg_fk.errors import closest, LegFKError, ParameterError, UnknownNameError
 from icub_leg_fk.kinematics import Catalog, Urdf
 from icub_leg_fk.kinematics.table_from_urdf import topic_name
-from icub_leg_fk.kinematics.urdf_chains import UrdfChains
 from icub_leg_fk.node.arguments import files_for_others, names_given, read_arguments
-from icub_leg_fk.node.qos_overrides import PREFIX, QoSOverrides
+from icub_leg_fk.node.qos_overrides import check_override, PREFIX
 from icub_leg_fk.node.rclpy_private import parameter_overrides
 from icub_leg_fk.stream.configuration import (
     Configuration,
@@ -188,8 +187,8 @@ class NodeParameters:
         self._given = names_given(self._arguments, node.get_fully_qualified_name())
         self.description_is_source = self._value('description_from_topic')
         self._catalog = self._catalog_at_start()
-        self._check_unknown()
         self.configuration = configuration_of(self._catalog, self._values())
+        self._check_unknown()
         self._candidate: Configuration | None = None
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._adopt)
@@ -251,61 +250,47 @@ class NodeParameters:
         Those of the command line are refused; those of files, which may be for all nodes, are
         named once.
         """
-        ignored = self._unknown()
         log = self._node.get_logger()
+        ignored = self._ignored()
         if ignored:
             log.warning(
                 f'ignored parameters that this node does not have: {", ".join(ignored)}'
             )
-        for line in files_for_others(
-            self._arguments, self._node.get_fully_qualified_name()
-        ):
+        node = self._node.get_fully_qualified_name()
+        for line in files_for_others(self._arguments, node):
             log.warning(line)
 
-    def _unknown(self) -> list[str]:
-        """Return the names that the node does not have, but for those given: they are refused."""
-        qos = QoSOverrides(self._roles())
-        unknown = []
+    def _ignored(self) -> list[str]:
+        """Return what files hold that the node does not have; refuse it on the command line."""
+        roles = self._roles()
+        ignored = []
         for name, override in self._overrides.items():
-            if name.startswith(PREFIX):
-                if qos.has(name):
-                    qos.check(name, override.value)
-                    continue
-                error = qos.unknown(name)
-            elif name in PARAMETER_NAMES:
-                continue
-            else:
-                error = UnknownNameError('parameter', name, PARAMETER_NAMES)
-            if name in self._given:
-                raise error
-            guess = closest(error.name, error.choices)
-            unknown.append(f'{name} (did you mean {guess}?)' if guess else name)
-        return unknown
+            try:
+                if name.startswith(PREFIX):
+                    check_override(name, override.value, roles)
+                elif name not in PARAMETER_NAMES:
+                    raise UnknownNameError('parameter', name, PARAMETER_NAMES)
+            except UnknownNameError as error:
+                if name in self._given:
+                    raise
+                guess = closest(error.name, error.choices)
+                ignored.append(f'{name} (did you mean {guess}?)' if guess else name)
+        return ignored
 
     def _roles(self) -> dict[str, str]:
         """Return `publisher` or `subscription` by full name of each topic whose QoS can change."""
-        resolve = self._node.resolve_topic_name
-        roles = {
-            resolve('joint_states'): 'subscription',
-            resolve('~/skeleton'): 'publisher',
-        }
-        for tip in self._tips():
-            for kind in ('pose', 'twist'):
-                roles[resolve(f'~/{tip}/{kind}')] = 'publisher'
-        return roles
-
-    def _tips(self) -> list[str]:
-        """Return the tips of all chains; of a URDF's, whose tables take time, of those asked for.
-
-        What is a chain of a description is not known before it has come.
-        """
-        catalog = self._catalog
-        if catalog and not isinstance(catalog.chains, UrdfChains):
-            return [entry.tip for entry in catalog.chains.values()]
+        tips = [chain.tip for chain in self.configuration.chains]
         shipped = Catalog.load()
-        chains = [shipped.split(name)[0] for name in self._value('chains')]
-        links = [topic_name(chain) for chain in chains if chain not in shipped.chains]
-        return [entry.tip for entry in shipped.chains.values()] + links
+        for awaited in self.configuration.awaited:
+            name, _ = shipped.split(awaited)
+            is_link = name not in shipped.chains
+            tips.append(topic_name(name) if is_link else shipped.chains[name].tip)
+        topics = ['~/skeleton']
+        for tip in tips:
+            topics += [f'~/{tip}/pose', f'~/{tip}/twist']
+        resolve = self._node.resolve_topic_name
+        roles = dict.fromkeys(map(resolve, topics), 'publisher')
+        return {resolve('joint_states'): 'subscription'} | roles
 
     def _values(self) -> dict[str, Any]:
         return {parameter.name: self._value(parameter.name) for parameter in PARAMETERS}
@@ -313,9 +298,7 @@ class NodeParameters:
     def _value(self, name: str) -> Any:
         try:
             return self._node.get_parameter(name).value
-        except (
-            ParameterUninitializedException
-        ):  # rclpy takes an empty list for no value
+        except ParameterUninitializedException:  # so rclpy takes an empty list
             return ()
 
     def _check(self, changes: Sequence[RclpyParameter]) -> SetParametersResult:

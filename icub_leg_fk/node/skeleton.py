@@ -3,18 +3,19 @@
 from collections.abc import Sequence
 
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Point
+from geometry_msgs.msg import Point, Vector3
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.stream.colors import color_of
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-_BONE_WIDTH = 0.012  # m
-_JOINT_DIAMETER = 0.03  # m
-_SOLE_WIDTH = 0.006  # m
-_NAME_HEIGHT = 0.04  # m; of its letters
-_NAME_BELOW = 0.08  # m; of its middle below the tip
+# Sizes [m], where RViz looks for them.
+_BONES = Vector3(x=0.012)
+_JOINTS = Vector3(x=0.03, y=0.03, z=0.03)
+_LETTERS = Vector3(z=0.04)
+_SOLE = Vector3(x=0.006)
+_NAME_BELOW = 0.08  # m; the middle of the name below the tip
 _JOINT_COLOR = ColorRGBA(r=0.75, g=0.75, b=0.78, a=1.0)
 
 
@@ -31,15 +32,20 @@ def skeleton_markers(
     """
     color = _color(chain)
     origins = [Point(), *_points(chain.frames(q)[:, :3, 3])]
-    markers = [
-        _line(origins, _BONE_WIDTH, color),
-        _balls(origins, _JOINT_DIAMETER, _JOINT_COLOR),
-        _name(chain.tip, origins[-1], color),
-    ]
+    bones = Marker(type=Marker.LINE_STRIP, points=origins, scale=_BONES, color=color)
+    joints = Marker(type=Marker.SPHERE_LIST, points=origins, scale=_JOINTS)
+    joints.color = _JOINT_COLOR
+    name = Marker(type=Marker.TEXT_VIEW_FACING, text=chain.tip, color=color)
+    name.scale = _LETTERS
+    tip = origins[-1]
+    name.pose.position = Point(x=tip.x, y=tip.y, z=tip.z - _NAME_BELOW)
+    markers = [bones, joints, name]
     corners = chain.sole_outline(q)
     if corners is not None:
         points = _points(corners)
-        markers.append(_line([*points, points[0]], _SOLE_WIDTH, color))
+        sole = Marker(type=Marker.LINE_STRIP, scale=_SOLE, color=color)
+        sole.points = [*points, points[0]]
+        markers.append(sole)
     for number, marker in enumerate(markers):
         marker.header = Header(stamp=stamp, frame_id=frame_prefix + chain.root_frame)
         marker.ns = chain.name
@@ -52,25 +58,6 @@ def skeleton_markers(
 def no_skeletons() -> MarkerArray:
     """Return what makes a viewer forget every skeleton, such as those of chains now dropped."""
     return MarkerArray(markers=[Marker(action=Marker.DELETEALL)])
-
-
-def _line(points: list[Point], width: float, color: ColorRGBA) -> Marker:
-    marker = Marker(type=Marker.LINE_STRIP, points=points, color=color)
-    marker.scale.x = width
-    return marker
-
-
-def _balls(points: list[Point], diameter: float, color: ColorRGBA) -> Marker:
-    marker = Marker(type=Marker.SPHERE_LIST, points=points, color=color)
-    marker.scale.x = marker.scale.y = marker.scale.z = diameter
-    return marker
-
-
-def _name(text: str, tip: Point, color: ColorRGBA) -> Marker:
-    marker = Marker(type=Marker.TEXT_VIEW_FACING, text=text, color=color)
-    marker.scale.z = _NAME_HEIGHT
-    marker.pose.position = Point(x=tip.x, y=tip.y, z=tip.z - _NAME_BELOW)
-    return marker
 
 
 def _points(positions: Array) -> list[Point]:

@@ -76,21 +76,18 @@ class Description:
             return [self._fault_note()]
         notes = []
         if self._use and self._urdf:
-            notes.append(
-                Note(
-                    'description',
-                    '',
-                    INFO,
-                    'computing with the description of '
-                    f'{self._urdf.name} on {self.topic}',
-                )
+            text = (
+                f'computing with the description of {self._urdf.name} on {self.topic}'
             )
+            notes.append(Note('description', text, level=INFO))
         for chain, (text, is_far) in self._comparisons.items():
+            level = INFO
             if is_far:
-                way = f'{PARAMETER}:=true computes with the description on {self.topic}'
-                notes.append(Note('description', chain, WARNING, f'{text}; {way}'))
-            else:
-                notes.append(Note('description', chain, INFO, text))
+                level = WARNING
+                text += (
+                    f'; {PARAMETER}:=true computes with the description on {self.topic}'
+                )
+            notes.append(Note('description', text, chain, level))
         return notes + self._notes_of_tf()
 
     def notes(self, publishers: Sequence[str]) -> list[Note]:
@@ -106,25 +103,16 @@ class Description:
         if self._fault:
             notes.append(self._fault_note())
         elif not self._urdf:
-            notes.append(
-                Note(
-                    'no_description',
-                    '',
-                    WARNING,
-                    'no description of the robot has '
-                    f'come on {self.topic}; it has {count}',
-                )
+            text = (
+                f'no description of the robot has come on {self.topic}; it has {count}'
             )
+            notes.append(Note('no_description', text))
         if len(publishers) > 1:
-            notes.append(
-                Note(
-                    'descriptions',
-                    '',
-                    WARNING,
-                    f'{self.topic} has {count}, and the '
-                    f'last description counts: {", ".join(publishers)}',
-                )
+            text = (
+                f'{self.topic} has {count}, and the last description counts: '
+                f'{", ".join(publishers)}'
             )
+            notes.append(Note('descriptions', text))
         return notes
 
     def value(self, chain: str) -> str:
@@ -144,42 +132,30 @@ class Description:
 
     def _fault_note(self) -> Note:
         if not self._use:
-            return Note(
-                UNUSABLE, '', WARNING, f'not compared with the robot: {self._fault}'
-            )
+            return Note(UNUSABLE, f'not compared with the robot: {self._fault}')
         stays = 'nothing is published until another one comes'
         if self._urdf:
             stays = 'the one before stays'
-        return Note(
-            UNUSABLE,
-            '',
-            ERROR,
-            f'description of the robot not used: {self._fault}; {stays}',
-        )
+        text = f'description of the robot not used: {self._fault}; {stays}'
+        return Note(UNUSABLE, text, level=ERROR)
 
     def _notes_of_tf(self) -> list[Note]:
         """Warn of transforms that robot_state_publisher, which has the description, sends too."""
         configuration = self._configuration
         if not self._urdf or not configuration or not configuration.publish_tf:
             return []
-        ids = [
-            configuration.frame_prefix + chain.frame_id
-            for chain in configuration.chains
-        ]
+        prefix = configuration.frame_prefix
+        ids = [prefix + chain.frame_id for chain in configuration.chains]
         shared = [frame_id for frame_id in ids if frame_id in self._urdf.links]
         if not shared:
             return []
-        return [
-            Note(
-                'shared_frames',
-                '',
-                WARNING,
-                f'publish_tf sends {" and ".join(shared)}, '
-                f'which the description on {self.topic} has, so that robot_state_publisher '
-                'sends it, too: leave publish_tf off, or set a frame_prefix, which is not '
-                'part of a description',
-            )
-        ]
+        text = (
+            f'publish_tf sends {" and ".join(shared)}, which the description on '
+            f'{self.topic} has, so that robot_state_publisher sends the same, fixed frames '
+            'on /tf_static, and what comes on /tf displaces those: leave publish_tf off, or '
+            'set a frame_prefix, which is not part of a description'
+        )
+        return [Note('shared_frames', text)]
 
 
 def compared(chain: Chain, urdf: Urdf, joint_prefix: str = '') -> Comparison:

@@ -20,15 +20,19 @@ _NAMES_SHOWN = 12
 _LONGEST_SHOWN = 40  # characters of a name
 _MANY_JUMPS = 3
 _LOOP = 20  # messages at least in a recording that is played again and again
-_FORMATS = {
-    'missing_joint': 'never seen',
-    'stale_joint': '{:.3f} s old',
-    'non_finite': '{}',
-    'no_velocity': '{}',
-    'looks_like_degrees': '{:.6g}',
-    'out_of_range': '{:.6g}',
+_NO_POSE = 'no pose from {}: {}'
+_OF_JOINTS = {
+    'missing_joint': (_NO_POSE, 'never seen'),
+    'stale_joint': (_NO_POSE, '{:.3f} s old'),
+    'non_finite': (_NO_POSE, '{}'),
+    'no_velocity': ('no twist from {}: velocity of {}', '{}'),
+    'looks_like_degrees': (
+        'positions look like degrees, radians are expected: {1}',
+        '{:.6g}',
+    ),
+    'out_of_range': ('out of range: {1}', '{:.6g}'),
 }
-"""How what was found of a joint is written, by reason."""
+"""What is written of the messages and joints that a reason concerns, and of each joint."""
 
 
 class Note(NamedTuple):
@@ -36,15 +40,15 @@ class Note(NamedTuple):
 
     Attributes:
         key: what it is about, such as `stale_joint`: the same as long as it lasts.
+        text: what there is to say, in a line that does not name the chain.
         chain: name of the chain that it is about; empty if it is about all messages.
         level: INFO, WARNING or ERROR.
-        text: what there is to say, in a line that does not name the chain.
     """
 
     key: str
-    chain: str
-    level: str
     text: str
+    chain: str = ''
+    level: str = WARNING
 
     def __str__(self) -> str:
         return f'{self.chain}: {self.text}' if self.chain else self.text
@@ -65,14 +69,11 @@ def notes_of(
         prefix_setting: what is written before another such prefix to have it looked for.
     """
     on_topic = f' on {topic}' if topic else ''
-    texts = dict(_of_messages(look, on_topic))
-    notes = [Note(key, '', WARNING, texts[key]) for key in texts]
-    for name, chain_look in look.chains.items():
-        texts = dict(_of_chain(chain_look))
-        texts.update(_of_frame_ids(look, chain_look))
-        names = _of_names(look, chain_look, on_topic, joint_prefix, prefix_setting)
-        texts.update(names)
-        notes += [Note(key, name, WARNING, texts[key]) for key in texts]
+    notes = [*_of_messages(look, on_topic)]
+    for chain_look in look.chains.values():
+        notes += _of_joints(chain_look)
+        notes += _of_frame_ids(look, chain_look)
+        notes += _of_names(look, chain_look, on_topic, joint_prefix, prefix_setting)
     return notes
 
 
@@ -86,70 +87,58 @@ def names_that_came(look: Look) -> str:
 
 def joints_found(reason: str, joints: Mapping[str, float]) -> str:
     """Return the joints that a reason concerns, with what was found of each."""
+    _, text = _OF_JOINTS[reason]
     words = []
     for joint, value in joints.items():
-        found = _FORMATS[reason].format(value)
-        if reason == 'no_velocity' and math.isnan(value):
-            found = 'unknown'
+        is_unknown = reason == 'no_velocity' and math.isnan(value)
+        found = 'unknown' if is_unknown else text.format(value)
         words.append(f'{joint} {found}')
     return ', '.join(words)
 
 
-def _of_messages(look: Look, on_topic: str) -> Iterator[tuple[str, str]]:
-    """Yield keys and texts of what there is to say of all messages."""
+def _of_messages(look: Look, on_topic: str) -> Iterator[Note]:
     for reason in ('malformed', 'position_length', 'duplicate_name'):
         count = look.rejected[reason]
         if count:
-            yield reason, f'{_messages(count)} rejected: {look.faults[reason]}'
+            text = f'{_messages(count)} rejected: {look.faults[reason]}'
+            yield Note(reason, text)
     if look.messages and look.rejected['empty_position'] == look.messages:
-        yield 'always_empty', f'no message{on_topic} has positions: position is empty'
+        text = f'no message{on_topic} has positions: position is empty'
+        yield Note('always_empty', text)
     jumps = look.rejected[TIME_JUMP]
     where = look.faults.get(TIME_JUMP)
     if jumps >= _MANY_JUMPS and jumps * _LOOP > look.messages:
-        yield (
+        yield Note(
             'many_time_jumps',
-            (
-                f'time stepped back {jumps} times in {look.messages} messages, last to {where}: '
-                'do several publishers bring the same joints?'
-            ),
+            f'time stepped back {jumps} times in {look.messages} messages, last to {where}: '
+            'do several publishers bring the same joints?',
         )
     elif jumps:
         times = f' {jumps} times, last' if jumps > 1 else ''
-        yield (
-            TIME_JUMP,
-            f'time stepped back{times} to {where}; held joints are forgotten',
-        )
+        text = f'time stepped back{times} to {where}; held joints are forgotten'
+        yield Note(TIME_JUMP, text)
 
 
-def _of_chain(look: ChainLook) -> Iterator[tuple[str, str]]:
-    """Yield keys and texts of what there is to say of a chain's joints."""
-    for reason in [reason for reason in _FORMATS if reason in look.joints]:
-        words = joints_found(reason, look.joints[reason])
-        messages = _messages(look.held_back[reason])
-        if reason == 'out_of_range':
-            yield reason, f'out of range: {words}'
-        elif reason == 'looks_like_degrees':
-            yield reason, f'positions look like degrees, radians are expected: {words}'
-        elif reason == 'no_velocity':
-            yield reason, f'no twist from {messages}: velocity of {words}'
-        else:
-            yield reason, f'no pose from {messages}: {words}'
+def _of_joints(look: ChainLook) -> Iterator[Note]:
+    for reason, (text, _) in _OF_JOINTS.items():
+        if reason in look.joints:
+            messages = _messages(look.held_back[reason])
+            joints = joints_found(reason, look.joints[reason])
+            yield Note(reason, text.format(messages, joints), look.chain.name)
 
 
-def _of_frame_ids(look: Look, chain_look: ChainLook) -> Iterator[tuple[str, str]]:
+def _of_frame_ids(look: Look, chain_look: ChainLook) -> Iterator[Note]:
     """Yield a warning of a joint that comes under several frame ids."""
     for joint in chain_look.chain.joint_names:
         frame_ids = [
             repr(name) for name, joints in look.frame_ids.items() if joint in joints
         ]
         if len(frame_ids) > 1:
-            yield (
-                'frame_ids',
-                (
-                    f'{joint} comes under the frame ids {" and ".join(frame_ids)}: from '
-                    f'{len(frame_ids)} robots?'
-                ),
+            text = (
+                f'{joint} comes under the frame ids {" and ".join(frame_ids)}: from '
+                f'{len(frame_ids)} robots?'
             )
+            yield Note('frame_ids', text, chain_look.chain.name)
             return
 
 
@@ -159,19 +148,17 @@ def _of_names(
     on_topic: str,
     joint_prefix: str,
     prefix_setting: str,
-) -> Iterator[tuple[str, str]]:
+) -> Iterator[Note]:
     """Yield a warning if no joint of a chain has come."""
     joints = chain_look.chain.joint_names
     if not look.names or not look.joints.isdisjoint(joints):
         return
     hint = name_hint(joints, look.names, joint_prefix, prefix_setting)
-    yield (
-        'no_match',
-        (
-            f'no message{on_topic} has one of its joints ({", ".join(joints)}); names that came: '
-            f'{names_that_came(look)}{hint}'
-        ),
+    text = (
+        f'no message{on_topic} has one of its joints ({", ".join(joints)}); names that came: '
+        f'{names_that_came(look)}{hint}'
     )
+    yield Note('no_match', text, chain_look.chain.name)
 
 
 def name_hint(

@@ -147,7 +147,7 @@ class LiveRobot:
             look = self._input.take_look()
         self._notes = notes_of(look, self._topic)
         if not look.messages:
-            self._notes = [Note('no_message', '', '', f'no message on {self._topic}')]
+            self._notes = [Note('no_message', f'no message on {self._topic}')]
 
     def _noted(self, chain: str, posture: Posture) -> Posture:
         """Return a posture with the reasons why there is none, or no newer one."""

@@ -1,11 +1,7 @@
 """Names, topics, frames, stamps and QoS of the node, as another participant sees them."""
 
-import subprocess
-import sys
-
 from geometry_msgs.msg import PoseStamped, TwistStamped
 from icub_leg_fk.kinematics.catalog import config_file
-import numpy as np
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
@@ -17,18 +13,15 @@ from support.node_harness import (
     LEFT,
     LOSSLESS,
     NodeProcess,
-    RIGHT,
     Robot,
     SECOND,
 )
 from support.node_oracle import assert_same_pose, oracle_pose
-import yaml
 
 MS = 1_000_000  # ns
-ANGLES = {name: 0.03 * (i + 1) * (-1) ** i for i, name in enumerate(BOTH)}
+Q = [0.03 * (i + 1) * (-1) ** i for i in range(12)]
 BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
 LATE = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-PARAMETERS = config_file('foot_pose_publisher.yaml')
 NODE = 'qos_overrides.{ns}/foot_pose_publisher'
 TWIST_QOS = {
     NODE + '/left_foot/twist.publisher.durability': 'transient_local',
@@ -51,18 +44,10 @@ RENAMED_QOS = {
 @pytest.fixture(scope='module')
 def shared():
     """Return a node that loses nothing, with the shipped parameter file, and a robot beside it."""
-    parameters = {**LOSSLESS, **TWIST_QOS}
-    with (
-        NodeProcess(parameters, ['--params-file', str(PARAMETERS)]) as node,
-        Robot(node) as robot,
-    ):
+    file = ['--params-file', str(config_file('foot_pose_publisher.yaml'))]
+    with NodeProcess(LOSSLESS | TWIST_QOS, file) as node, Robot(node) as robot:
         robot.connect()
         yield node, robot
-
-
-@pytest.fixture
-def robot(shared):
-    return shared[1]
 
 
 @pytest.fixture(scope='module')
@@ -73,35 +58,6 @@ def default_robot():
         yield robot
 
 
-def send_angles(robot, stamp, names=BOTH):
-    robot.send(stamp, names, [ANGLES.get(name, 9.0) for name in names])
-
-
-def expected(chain, names, version='v2_5'):
-    return oracle_pose(chain, version, [ANGLES[name] for name in names])
-
-
-def test_names_that_change_between_messages_are_picked_up_at_once(robot):
-    start = robot.connect() + SECOND
-    orders = [BOTH, RIGHT + LEFT, BOTH[::-1], ('a', *BOTH), BOTH, ('bb', *BOTH[::-1])]
-    for stamp, names in enumerate(orders, start):
-        send_angles(robot, stamp, names)
-        pose = robot.take(robot.left, stamp)[-1]
-        robot.take(robot.right, stamp)
-        assert_same_pose(pose, expected('left_leg', LEFT))
-
-
-def test_pose_has_the_stamp_of_its_message_and_the_frame_of_the_root(robot):
-    stamp = robot.connect() + 123_456_789
-    send_angles(robot, stamp)
-    for inbox in robot.poses.values():
-        pose = robot.take(inbox, stamp)[-1]
-        assert pose.header.frame_id == 'root_link'
-        q = pose.pose.orientation
-        assert q.w >= 0
-        assert np.isclose(np.linalg.norm([q.x, q.y, q.z, q.w]), 1.0, rtol=0, atol=1e-15)
-
-
 def endpoint(robot, kind, topic):
     """Return type, reliability and durability of the node's publisher or subscription."""
     lister = getattr(robot.node, f'get_{kind}_info_by_topic')
@@ -109,13 +65,14 @@ def endpoint(robot, kind, topic):
 
     def is_there():
         found[:] = [
-            info for info in lister(topic) if info.node_name == 'foot_pose_publisher'
+            (info.topic_type, info.qos_profile.reliability, info.qos_profile.durability)
+            for info in lister(topic)
+            if info.node_name == 'foot_pose_publisher'
         ]
-        return bool(found)
+        return len(found) == 1
 
     robot.until(is_there, f'{kind} of {topic}')
-    [info] = found
-    return info.topic_type, info.qos_profile.reliability, info.qos_profile.durability
+    return found[0]
 
 
 def test_topics_have_the_types_and_qos_of_the_contract(default_robot):
@@ -126,47 +83,26 @@ def test_topics_have_the_types_and_qos_of_the_contract(default_robot):
         ReliabilityPolicy.BEST_EFFORT,
         volatile,
     )
-    for foot in FEET:
-        assert endpoint(robot, 'publishers', f'/foot_pose_publisher/{foot}/pose') == (
+    topics = [f'/foot_pose_publisher/{foot}/pose' for foot in FEET]
+    for topic in topics:
+        assert endpoint(robot, 'publishers', topic) == (
             'geometry_msgs/msg/PoseStamped',
             ReliabilityPolicy.RELIABLE,
             volatile,
         )
-    pose = '/foot_pose_publisher/left_foot/pose.publisher'
-    names = [
-        f'qos_overrides.{topic}.depth' for topic in ('/joint_states.subscription', pose)
-    ]
-    answer = robot.result(robot.parameters().get_parameters(names))
-    assert [value.integer_value for value in answer.values] == [100, 10]
+    names = ['/joint_states.subscription', *(f'{topic}.publisher' for topic in topics)]
+    depths = [f'qos_overrides.{name}.depth' for name in names]
+    answer = robot.result(robot.parameters().get_parameters(depths))
+    assert [value.integer_value for value in answer.values] == [100, 10, 10]
 
 
-def test_shipped_parameter_file_holds_the_defaults(default_robot):
+def test_a_best_effort_publisher_is_heard_and_empty_bytes_are_dropped(default_robot):
     robot = default_robot
-    [in_file] = yaml.safe_load(PARAMETERS.read_text()).values()
-    defaults = in_file['ros__parameters']
-    answer = robot.result(robot.parameters().get_parameters([*defaults]))
-    for value, default in zip(answer.values, defaults.values(), strict=True):
-        given = (
-            value.bool_value,
-            value.double_value,
-            value.string_value,
-            list(value.string_array_value),
-        )
-        assert default in given
-
-
-@pytest.mark.parametrize('qos', [BEST_EFFORT, DEEP], ids=['best effort', 'reliable'])
-def test_publishers_of_either_reliability_are_heard(default_robot, qos):
-    robot = default_robot
-    publisher = robot.node.create_publisher(JointState, 'joint_states', qos)
-    robot.connect(publisher=publisher)
+    publisher = robot.node.create_publisher(JointState, 'joint_states', BEST_EFFORT)
+    stamp = robot.connect(publisher=publisher)
+    publisher.publish(b'')
+    robot.connect(stamp + SECOND, publisher=publisher)
     robot.node.destroy_publisher(publisher)
-
-
-def test_empty_bytes_over_the_default_qos_are_dropped(default_robot):
-    t = default_robot.connect()
-    default_robot.joints.publish(b'')
-    default_robot.connect(t + SECOND)
 
 
 def test_qos_can_be_overridden_by_parameters_and_a_mismatch_is_said(shared):
@@ -182,10 +118,6 @@ def test_qos_can_be_overridden_by_parameters_and_a_mismatch_is_said(shared):
     robot.take(robot.right, stamp)
     # Whoever subscribes late to a transient-local topic gets the last message all the same.
     robot.wait_for(robot.listen(TwistStamped, left, LATE), stamp)
-    robot.node.create_publisher(JointState, 'joint_states', BEST_EFFORT)
-    node.wait_for_log(
-        "publisher discovered on topic 'joint_states', offering incompatible QoS"
-    )
     robot.listen(TwistStamped, right, DEEP)
     node.wait_for_log(
         "subscription discovered on topic '~/right_foot/twist', requesting "
@@ -193,7 +125,8 @@ def test_qos_can_be_overridden_by_parameters_and_a_mismatch_is_said(shared):
     )
 
 
-def test_nodes_in_namespaces_work_side_by_side(robot, default_robot):
+def test_nodes_in_namespaces_work_side_by_side(shared, default_robot):
+    _, robot = shared
     assert robot.change(version='v1').successful
     assert default_robot.change(frame_prefix='blue/').successful
     for each, version, root in (
@@ -201,17 +134,15 @@ def test_nodes_in_namespaces_work_side_by_side(robot, default_robot):
         (default_robot, 'v2_5', 'blue/root_link'),
     ):
         stamp = each.connect() + 1
-        send_angles(each, stamp)
+        each.send(stamp, BOTH, Q)
         each.wait_for(each.left, stamp)
         pose = each.take(each.right, stamp)[-1]
         assert pose.header.frame_id == root
-        assert_same_pose(pose, expected('right_leg', RIGHT, version))
+        assert_same_pose(pose, oracle_pose('right_leg', version, Q[6:]))
     assert {pose.header.frame_id for pose in robot.left} == {'root_link'}
 
 
-@pytest.fixture(scope='module')
-def renamed():
-    """Return a robot beside a node of other names and chains, and the last stamp it sent."""
+def test_topics_and_node_can_be_renamed_and_any_chain_chosen():
     parameters = {
         'chains': ['head_imu=v2', 'left_leg=v1'],
         'foot_frame': 'sole',
@@ -221,57 +152,15 @@ def renamed():
         NodeProcess(parameters, RENAMED) as node,
         Robot(node, tips=['head_imu'], name='feet') as robot,
     ):
-        robot.torso = robot.node.create_publisher(
-            JointState, '/yarp/state/joints', DEEP
+        joints = robot.node.create_publisher(JointState, '/yarp/state/joints', DEEP)
+        left, head = robot.listen(PoseStamped, '/where/left'), robot.poses['head_imu']
+        stamp = 1 + robot.connect(
+            names=LEFT + HEAD, inboxes=[head, left], publisher=joints
         )
-        robot.left = robot.listen(PoseStamped, '/where/left')
-        robot.head = robot.poses['head_imu']
-        stamp = robot.connect(
-            names=LEFT + HEAD, inboxes=[robot.head, robot.left], publisher=robot.torso
-        )
+        robot.send(stamp, LEFT + HEAD, Q, joints)
+        for inbox, expected in (
+            (left, oracle_pose('left_leg', 'v1', Q[:6], 'sole')),
+            (head, oracle_pose('head_imu', 'v2', Q[6:])),
+        ):
+            assert_same_pose(robot.take(inbox, stamp)[-1], expected)
         assert 'head_imu has no sole' in node.log()
-        yield node, robot, stamp
-
-
-def test_topics_and_node_can_be_renamed_and_any_chain_chosen(renamed):
-    _, robot, stamp = renamed
-    q = [0.1, 0.2, -0.1, -0.3, 0.2, 0.1]
-    head_q = [0.1 * i for i in range(6)]
-    robot.send(stamp + 1, LEFT + HEAD, q + head_q, robot.torso)
-    assert_same_pose(
-        robot.take(robot.left, stamp + 1)[-1], oracle_pose('left_leg', 'v1', q, 'sole')
-    )
-    assert_same_pose(
-        robot.take(robot.head, stamp + 1)[-1], oracle_pose('head_imu', 'v2', head_q)
-    )
-
-
-def test_torso_and_neck_from_two_publishers_interleave_out_of_order(renamed):
-    node, robot, stamp = renamed
-    neck = robot.node.create_publisher(JointState, '/yarp/state/joints', DEEP)
-    start = robot.connect(stamp + MS, HEAD, [robot.head], neck)
-    torso_q = neck_q = [0.0] * 3
-    for i in range(1, 6):
-        torso_at = start + 10 * i * MS
-        torso_q = [0.01 * (i + k) for k in range(3)]
-        robot.send(torso_at, HEAD[:3], torso_q, robot.torso)
-        pose = robot.take(robot.head, torso_at)[-1]
-        if i > 1:
-            assert_same_pose(pose, oracle_pose('head_imu', 'v2', torso_q + neck_q))
-        neck_q = [0.01 * (i + k) for k in range(3, 6)]
-        robot.send(torso_at - MS, HEAD[3:], neck_q, neck)
-        pose = robot.take(robot.head, torso_at - MS)[-1]
-        assert_same_pose(pose, oracle_pose('head_imu', 'v2', torso_q + neck_q))
-    assert 'time stepped back' not in node.log()
-
-
-def test_help_is_shown_without_a_node():
-    run = subprocess.run(
-        [sys.executable, '-m', 'icub_leg_fk.node.main', '--help'],
-        capture_output=True,
-        text=True,
-        timeout=30,
-        check=False,
-    )
-    assert (run.returncode, run.stderr) == (0, '')
-    assert 'version' in run.stdout

@@ -72,12 +72,13 @@ class Watch:
         look = self.input.take_look()
         self.said.looks += 1
         surroundings = self.around._replace(**around)
-        notes = notes_around(look, surroundings, self.totals) + notes_of(
-            look, '/joint_states'
-        )
+        notes = [
+            *notes_around(look, surroundings, self.totals),
+            *notes_of(look, '/joint_states'),
+        ]
         self.log.show(notes, look)
         self.totals.add(look)
-        self.verdicts = [verdict(look, chain, notes) for chain in look.chains.values()]
+        self.verdicts = [verdict(look, chain, notes) for chain in look.chains]
 
 
 @pytest.fixture

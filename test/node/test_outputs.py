@@ -1,5 +1,8 @@
 """Twists, skeletons and transforms that the node publishes on request."""
 
+from functools import partial
+from importlib.util import find_spec
+
 from geometry_msgs.msg import TwistStamped
 from icub_leg_fk.kinematics import Catalog
 import numpy as np
@@ -14,6 +17,12 @@ Q = np.array([0.2, 0.1, -0.1, -0.5, -0.3, 0.1, 0.15, 0.05, 0.1, -0.4, -0.2, -0.1
 CHAINS = dict(
     zip(FEET, (('left_leg', slice(6)), ('right_leg', slice(6, 12))), strict=True)
 )
+MARKER_TYPES = [
+    Marker.LINE_STRIP,
+    Marker.SPHERE_LIST,
+    Marker.TEXT_VIEW_FACING,
+    Marker.LINE_STRIP,
+]
 SOLE = [[-0.07, 0.04, 0.0], [0.12, 0.04, 0.0], [0.12, -0.04, 0.0], [-0.07, -0.04, 0.0]]
 POSE_TOPICS = {f'{tip}/pose' for tip in FEET}
 TWIST_TOPICS = {f'{tip}/twist' for tip in FEET}
@@ -43,6 +52,7 @@ class Twists:
 
         def answered():
             self.send(Q, np.zeros(12))
+            robot.spin(0.02)
             return all(self.inboxes.values())
 
         robot.until(answered, 'twists of both feet')
@@ -50,17 +60,13 @@ class Twists:
 
     def send(self, q, qdot, names=BOTH):
         self.stamp += MS
-        self.robot.send(self.stamp, names, q, velocity=[float(value) for value in qdot])
-        self.robot.spin(0.02)
+        self.robot.send(self.stamp, names, q, velocity=list(map(float, qdot)))
 
     def answers(self):
-        """Wait for the answers to the last message and empty all inboxes."""
-        poses = {
-            tip: self.robot.take(self.robot.poses[tip], self.stamp) for tip in FEET
-        }
-        return poses, {
-            tip: self.robot.take(self.inboxes[tip], self.stamp) for tip in FEET
-        }
+        """Return poses and twists by tip up to the answers to the last message."""
+        take, last = self.robot.take, self.stamp
+        poses = {tip: take(self.robot.poses[tip], last) for tip in FEET}
+        return poses, {tip: take(self.inboxes[tip], last) for tip in FEET}
 
 
 @pytest.fixture(scope='module')
@@ -70,37 +76,23 @@ def twists(shared):
     return Twists(node, robot)
 
 
-def own_topics(node, robot, wanted):
-    """Return the topics that the node offers, once it offers those that are wanted."""
+def offers(node, robot, topics):
+    """Return whether the node offers just these; it does not until its name is announced."""
     name, namespace = 'foot_pose_publisher', node.namespace
-    wanted = {node.topic(topic) for topic in wanted}
-    offered = set()
-
-    def is_there():  # a node's name is announced apart from its topics
-        offered.clear()
-        if (name, namespace) not in robot.node.get_node_names_and_namespaces():
-            return False
-        found = robot.node.get_publisher_names_and_types_by_node(name, namespace)
-        offered.update(topic for topic, _ in found)
-        return wanted <= offered
-
-    robot.until(is_there, offered)
-    return {topic.removeprefix(node.topic('')) for topic in offered}
+    if (name, namespace) not in robot.node.get_node_names_and_namespaces():
+        return False
+    found = robot.node.get_publisher_names_and_types_by_node(name, namespace)
+    return {topic.removeprefix(node.topic('')) for topic, _ in found} == topics
 
 
 def test_no_other_topic_is_offered_unless_asked_for(shared):
     node, robot = shared
+    always = POSE_TOPICS | {'/diagnostics', '/rosout', '/parameter_events'}
     # Announcements come in order: once the twists are there, whatever was before them is.
-    assert robot.change(publish_twist=True).successful
-    offered = own_topics(node, robot, TWIST_TOPICS)
-    own = POSE_TOPICS | TWIST_TOPICS
-    assert own <= offered
-    assert offered - own <= {'/diagnostics', '/rosout', '/parameter_events'}
-    assert robot.change(publish_twist=False).successful
-    robot.until(
-        lambda: own_topics(node, robot, POSE_TOPICS).isdisjoint(TWIST_TOPICS),
-        'no twists',
-    )
+    for wants_twists in (True, False):
+        assert robot.change(publish_twist=wants_twists).successful
+        wanted = always | (TWIST_TOPICS if wants_twists else set())
+        robot.until(partial(offers, node, robot, wanted), wanted)
 
 
 def vector(twist):
@@ -124,120 +116,71 @@ def test_twist_is_the_jacobian_times_the_velocities(twists):
             )
 
 
-@pytest.mark.parametrize(
-    ('qdot', 'feet'),
-    [
-        ([], []),
-        ([0.1] * 11, []),
-        ([0.1] * 11 + [np.nan], ['left_foot']),
-        ([np.inf] + [0.1] * 11, ['right_foot']),
-    ],
-    ids=['none', 'short', 'nan', 'inf'],
-)
-def test_no_twist_without_all_velocities_but_the_pose_goes_out(twists, qdot, feet):
-    twists.send(Q, qdot)
-    bad = twists.stamp
+def test_without_all_velocities_the_pose_goes_out_alone(twists):
+    assert twists.robot.change(frame_prefix='a/').successful
+    bad = twists.stamp + MS
+    twists.send(Q, [np.inf] + [0.1] * 11)
     twists.send(Q, np.ones(12))
     poses, answers = twists.answers()
-    for tip in FEET:
+    for tip, stamps in zip(FEET, ([twists.stamp], [bad, twists.stamp]), strict=True):
         assert poses[tip].stamps() == [bad, twists.stamp]
-        assert (bad in answers[tip].stamps()) == (tip in feet)
-
-
-def test_frame_prefix_holds_for_twists_and_topics_go_when_they_are_switched_off(
-    shared, twists
-):
-    node, robot = shared
-    assert robot.change(frame_prefix='a/').successful
-    twists.send(Q, np.ones(12))
-    _, answers = twists.answers()
-    assert answers['left_foot'][0].header.frame_id == 'a/root_link'
-    assert robot.change(publish_twist=False, frame_prefix='').successful
-    topic = node.topic('left_foot/twist')
-    robot.until(
-        lambda: robot.node.count_publishers(topic) == 0, 'the twist topic to go'
-    )
+        assert answers[tip].stamps() == stamps
+        assert answers[tip][-1].header.frame_id == 'a/root_link'
+    assert twists.robot.change(publish_twist=False, frame_prefix='').successful
 
 
 def points_of(marker):
     return np.array([[point.x, point.y, point.z] for point in marker.points])
 
 
-def test_skeletons_go_through_the_frames_of_each_leg_to_the_outline_of_its_sole(shared):
+def test_skeletons_go_through_the_frames_to_the_sole_and_viewers_forget_old_ones(
+    shared,
+):
     node, robot = shared
-    assert robot.change(
-        publish_markers=True, frame_prefix='x/', foot_frame='sole'
-    ).successful
-    inbox = []
-    robot.node.create_subscription(
-        MarkerArray, node.topic('skeleton'), inbox.append, 10
-    )
+    values = {'publish_markers': True, 'frame_prefix': 'x/', 'foot_frame': 'sole'}
+    assert robot.change(**values).successful
     by_chain = {}
+
+    def receive(array):
+        by_chain[array.markers[0].ns] = array.markers
+
+    robot.node.create_subscription(MarkerArray, node.topic('skeleton'), receive, 10)
 
     def both_skeletons():
         robot.send(SECOND, BOTH, Q)
-        by_chain.update({array.markers[0].ns: array.markers for array in inbox})
-        return len(by_chain) >= 2
+        robot.spin(0.02)
+        return by_chain.keys() >= {'left_leg', 'right_leg'}
 
     robot.until(both_skeletons, 'skeletons')
-    assert set(by_chain) == {'left_leg', 'right_leg'}
     for chain, part in CHAINS.values():
+        bones, joints, name, sole = by_chain[chain]
         for marker in by_chain[chain]:
             assert marker.header.frame_id == 'x/root_link'
             assert (marker.header.stamp.sec, marker.header.stamp.nanosec) == (1, 0)
             assert (marker.action, marker.color.a) == (Marker.ADD, 1.0)
-        bones, joints, name, sole = by_chain[chain]
-        assert (bones.type, joints.type, name.type, sole.type) == (
-            Marker.LINE_STRIP,
-            Marker.SPHERE_LIST,
-            Marker.TEXT_VIEW_FACING,
-            Marker.LINE_STRIP,
-        )
+        assert [bones.type, joints.type, name.type, sole.type] == MARKER_TYPES
         frames = Catalog.load().chain(chain, 'v2_5', 'sole').frames(Q[part])
-        foot = oracle_pose(chain, 'v2_5', Q[part])[:3, 3]
-        for marker in (bones, joints):
-            points = points_of(marker)
-            assert not points[0].any()
-            np.testing.assert_allclose(points[1:], frames[:, :3, 3], rtol=0, atol=1e-12)
-            np.testing.assert_allclose(points[-1], foot, rtol=0, atol=1e-12)
         T = oracle_pose(chain, 'v2_5', Q[part], 'sole')  # x forward, y left, z up
+        points = np.array([np.zeros(3), *frames[:, :3, 3]])
+        np.testing.assert_allclose(points[-1], T[:3, 3], rtol=0, atol=1e-12)
+        for marker in (bones, joints):
+            np.testing.assert_allclose(points_of(marker), points, rtol=0, atol=1e-12)
         corners = (points_of(sole) - T[:3, 3]) @ T[:3, :3]
         np.testing.assert_allclose(corners, [*SOLE, SOLE[0]], rtol=0, atol=1e-12)
-
-
-def test_viewers_forget_the_skeletons_of_what_is_published_no_more(shared):
-    node, robot = shared
-    assert robot.change(publish_markers=True).successful
-    inbox = []
-    robot.node.create_subscription(
-        MarkerArray, node.topic('skeleton'), inbox.append, 10
-    )
-
-    def is_heard():
-        robot.send(SECOND, BOTH, Q)
-        return bool(inbox)
-
-    robot.until(is_heard, 'skeletons')
+    values = {'publish_markers': False, 'frame_prefix': '', 'foot_frame': 'dh'}
     assert robot.change(version='v1').successful
-    robot.until(
-        lambda: any(array.markers[0].action == Marker.DELETEALL for array in inbox),
-        'removal of the skeletons',
-    )
-    assert robot.change(
-        version='v2_5', publish_markers=False, frame_prefix='', foot_frame='dh'
-    ).successful
+    robot.until(lambda: '' in by_chain, 'removal of the skeletons')
+    [marker] = by_chain['']
+    assert marker.action == Marker.DELETEALL
+    assert robot.change(version='v2_5', **values).successful
 
 
+@pytest.mark.skipif(find_spec('tf2_msgs') is not None, reason='tf2_msgs is installed')
 def test_transforms_are_refused_in_one_line_where_tf2_msgs_is_missing(shared):
-    try:
-        import tf2_msgs
-    except ImportError:
-        result = shared[1].change(publish_tf=True)
-        assert not result.successful
-        assert 'tf2_msgs' in result.reason
-        assert '\n' not in result.reason
-    else:
-        pytest.skip(f'tf2_msgs is there: {tf2_msgs.__file__}')
+    result = shared[1].change(publish_tf=True)
+    assert not result.successful
+    assert 'tf2_msgs' in result.reason
+    assert '\n' not in result.reason
 
 
 @pytest.mark.parametrize(

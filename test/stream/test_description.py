@@ -197,6 +197,7 @@ def test_transforms_that_the_description_has_are_a_warning():
     assert line.startswith(
         'publish_tf sends l_foot_dh_frame and r_foot_dh_frame, which the descr'
     )
+    assert 'fixed frames on /tf_static, and what comes on /tf displaces those' in line
     assert warnings() == []
     assert warnings(publish_tf=True, frame_prefix='fk/') == []
     assert (
