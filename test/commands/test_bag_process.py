@@ -42,17 +42,17 @@ def long_bag(tmp_path_factory):
 
 
 @pytest.fixture
-def source(tmp_path):
-    return write_bag(tmp_path / 'in', joints=walk(5))
+def source():
+    return write_bag('in', joints=walk(5))
 
 
 @pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 @pytest.mark.parametrize('words', [(), ('--force',)])
-def test_a_stopped_run_leaves_nothing(tmp_path, long_bag, number, words):
+def test_a_stopped_run_leaves_nothing(long_bag, number, words):
     if words:
-        write_bag(tmp_path / 'out', joints=walk(3))
+        write_bag('out', joints=walk(3))
     before = [read_bag(path) for path in tmp_path.iterdir()]
-    process = start(long_bag, tmp_path / 'out', *words)
+    process = start(long_bag, 'out', *words)
 
     def is_working():
         return any(
@@ -67,7 +67,7 @@ def test_a_stopped_run_leaves_nothing(tmp_path, long_bag, number, words):
 
 
 @pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
-def test_a_full_disk_is_one_line_and_leaves_nothing(tmp_path, long_bag, storage):
+def test_a_full_disk_is_one_line_and_leaves_nothing(long_bag, storage):
     """RLIMIT_FSIZE stands in for the disk: what is written beyond it fails."""
     code = (
         'import resource, signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN); '
@@ -81,7 +81,7 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(tmp_path, long_bag, storage)
             code,
             'bag',
             long_bag,
-            tmp_path / 'out',
+            'out',
             '--storage',
             storage,
         ],
@@ -93,38 +93,38 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(tmp_path, long_bag, storage)
     assert entries(tmp_path) == []
 
 
-def test_an_existing_bag_is_replaced_only_with_force(tmp_path, source):
+def test_an_existing_bag_is_replaced_only_with_force(source):
     for name in ('out', 'out.mcap'):
-        assert run_main('bag', source, tmp_path / name).returncode == 0
-        old = read_bag(tmp_path / name)
+        assert run_main('bag', source, name).returncode == 0
+        old = read_bag(name)
         assert_one_line_complaint(
-            run_main('bag', source, tmp_path / name),
+            run_main('bag', source, name),
             f'{name}: exists already; --force replaces it',
         )
-        assert read_bag(tmp_path / name) == old
-        run_main('bag', source, tmp_path / name, '--force', '--chains', 'left_leg')
-        assert read_bag(tmp_path / name) != old
+        assert read_bag(name) == old
+        run_main('bag', source, name, '--force', '--chains', 'left_leg')
+        assert read_bag(name) != old
     assert entries(tmp_path) == ['in', 'out', 'out.mcap']
 
 
-def test_force_replaces_nothing_but_bags(tmp_path, source):
-    precious = tmp_path / 'precious'
+def test_force_replaces_nothing_but_bags(source):
+    precious = 'precious'
     (precious / 'more').mkdir(parents=True)
     (precious / 'walk.mcap').write_text('a bag')
-    (tmp_path / 'notes.txt').write_text('notes')
-    (tmp_path / 'empty').mkdir()
-    (tmp_path / 'link').symlink_to(precious)
-    shelf = tmp_path / 'shelf'  # two recordings, each in its folder or file
+    Path('notes.txt').write_text('notes')
+    Path('empty').mkdir()
+    Path('link').symlink_to(precious)
+    shelf = 'shelf'  # two recordings, each in its folder or file
     shutil.copytree(source, shelf / 'monday.mcap')
     shutil.copyfile(source / 'in.mcap', shelf / 'tuesday.mcap')
-    annotated = shutil.copytree(source, tmp_path / 'annotated')
+    annotated = shutil.copytree(source, 'annotated')
     (annotated / 'in.mcap.notes.txt').write_text('notes')
-    linked = shutil.copytree(source, tmp_path / 'linked')
-    (linked / 'in.mcap').rename(tmp_path / 'elsewhere.mcap')
-    (linked / 'in.mcap').symlink_to(tmp_path / 'elsewhere.mcap')
-    (tmp_path / 'folder' / 'metadata.yaml').mkdir(parents=True)
-    (tmp_path / 'own').mkdir()
-    (tmp_path / 'own' / 'metadata.yaml').write_text('my: notes')
+    linked = shutil.copytree(source, 'linked')
+    (linked / 'in.mcap').rename('elsewhere.mcap')
+    (linked / 'in.mcap').symlink_to('elsewhere.mcap')
+    Path('folder/metadata.yaml').mkdir(parents=True)
+    Path('own').mkdir()
+    Path('own/metadata.yaml').write_text('my: notes')
     before = sorted(tmp_path.rglob('*'))
     for name in (
         'precious',
@@ -138,16 +138,16 @@ def test_force_replaces_nothing_but_bags(tmp_path, source):
         'own',
     ):
         assert_one_line_complaint(
-            run_main('bag', source, tmp_path / name, '--force'),
+            run_main('bag', source, name, '--force'),
             'exists already and is something else',
         )
     assert sorted(tmp_path.rglob('*')) == before
 
 
-def test_the_input_is_never_the_output(tmp_path, source):
+def test_the_input_is_never_the_output(source):
     before = read_bag(source)
-    (tmp_path / 'link').symlink_to(source)
-    (tmp_path / 'loop').symlink_to('loop')
+    Path('link').symlink_to(source)
+    Path('loop').symlink_to('loop')
     for words in (
         ('in', 'in'),
         ('in', 'link'),
@@ -157,7 +157,7 @@ def test_the_input_is_never_the_output(tmp_path, source):
         ('in/in.mcap', 'in/in.mcap'),
         ('in', 'in/../in/'),
     ):
-        paths = [tmp_path / word for word in words]
+        paths = [word for word in words]
         assert_one_line_complaint(
             run_main('bag', *paths, '--force'), 'is the input itself'
         )
@@ -220,7 +220,7 @@ def test_the_input_is_never_the_output(tmp_path, source):
         (['in', 'o' * 250], 'file name too long'),
     ],
 )
-def test_wrong_words_are_one_line(tmp_path, monkeypatch, source, words, complaint):
+def test_wrong_words_are_one_line(monkeypatch, source, words, complaint):
     monkeypatch.chdir(tmp_path)
     Path('notes.txt').write_text('notes')
     Path('loop').symlink_to('loop')
@@ -232,46 +232,46 @@ def test_wrong_words_are_one_line(tmp_path, monkeypatch, source, words, complain
     ]
 
 
-def test_many_bags_side_by_side(tmp_path):
-    sources = [write_bag(tmp_path / f'walk{i}', joints=walk(100 + i)) for i in range(3)]
-    sources.append(write_bag(tmp_path / 'x', 'sqlite3', joints=walk(9)) / 'x.db3')
+def test_many_bags_side_by_side():
+    sources = [write_bag(f'walk{i}', joints=walk(100 + i)) for i in range(3)]
+    sources.append(write_bag('x', 'sqlite3', joints=walk(9)) / 'x.db3')
     for jobs in (1, 2):
-        out = tmp_path / f'out{jobs}'
+        out = f'out{jobs}'
         done = run_main('bag', *sources, '--out-dir', out, '--jobs', jobs)
         assert (done.returncode, done.stderr) == (0, '')
         assert entries(out) == ['walk0', 'walk1', 'walk2', 'x.db3']
         for source in sources:
             assert f'{source} -> {out / source.name}\n' in done.stdout
     for source in sources:
-        alone = tmp_path / f'alone_{source.name}'
+        alone = f'alone_{source.name}'
         run_main('bag', source, alone)
         for jobs in (1, 2):
-            assert read_bag(tmp_path / f'out{jobs}' / source.name) == read_bag(alone)
+            assert read_bag(f'out{jobs}' / source.name) == read_bag(alone)
 
 
 @pytest.mark.parametrize('jobs', [1, 2])
-def test_one_bad_bag_does_not_stop_the_others(tmp_path, jobs):
+def test_one_bad_bag_does_not_stop_the_others(jobs):
     sources = [
-        write_bag(tmp_path / name, joints=walk(count))
+        write_bag(name, joints=walk(count))
         for name, count in (('a', 5), ('b', 0), ('c', 5))
     ]
-    done = run_main('bag', *sources, '--out-dir', tmp_path / 'out', '--jobs', jobs)
+    done = run_main('bag', *sources, '--out-dir', 'out', '--jobs', jobs)
     assert done.returncode == 2
     assert re.fullmatch(
         r'leg_fk: error: .*/b: no message of joint states.*\n', done.stderr
     )
-    assert entries(tmp_path / 'out') == ['a', 'c']
-    done = run_main('bag', *sources, '--out-dir', tmp_path / 'out', '--version', 'v9')
+    assert entries('out') == ['a', 'c']
+    done = run_main('bag', *sources, '--out-dir', 'out', '--version', 'v9')
     assert re.fullmatch(
         r'(leg_fk: error: .*/[abc]: --version: unknown .*\n){3}', done.stderr
     )
 
 
 @pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGINT])
-def test_stopped_jobs_leave_nothing(tmp_path, long_bag, number):
-    (tmp_path / 'other').symlink_to(long_bag)
-    out = tmp_path / 'out'
-    process = start(long_bag, tmp_path / 'other', '--out-dir', out, '--jobs', 2)
+def test_stopped_jobs_leave_nothing(long_bag, number):
+    Path('other').symlink_to(long_bag)
+    out = 'out'
+    process = start(long_bag, 'other', '--out-dir', out, '--jobs', 2)
     wait_for(lambda: len(list(out.glob('.*.part/*/*'))) == 2, process)
     process.send_signal(number)
     assert process.communicate(timeout=DEADLINE) == ('', '')
@@ -279,7 +279,7 @@ def test_stopped_jobs_leave_nothing(tmp_path, long_bag, number):
 
 
 @pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
-def test_memory_does_not_grow_with_the_bag(tmp_path, storage):
+def test_memory_does_not_grow_with_the_bag(storage):
     """Peak resident size of the process, for a bag and one of five times its size."""
     code = (
         'import sys; from icub_leg_fk.__main__ import main; status = main(); '
@@ -294,9 +294,9 @@ def test_memory_does_not_grow_with_the_bag(tmp_path, storage):
             for i in range(times)
             for time, data in walked
         ]
-        source = write_bag(tmp_path / f'in_{times}', storage, joints, others=False)
+        source = write_bag(f'in_{times}', storage, joints, others=False)
         done = subprocess.run(
-            [sys.executable, '-c', code, 'bag', source, tmp_path / f'out_{times}'],
+            [sys.executable, '-c', code, 'bag', source, f'out_{times}'],
             capture_output=True,
             text=True,
             timeout=300,
@@ -307,13 +307,11 @@ def test_memory_does_not_grow_with_the_bag(tmp_path, storage):
     assert peaks[1] < 110, peaks
 
 
-def test_a_terminal_shows_progress_and_nothing_else_does(
-    tmp_path, long_bag, monkeypatch
-):
+def test_a_terminal_shows_progress_and_nothing_else_does(long_bag, monkeypatch):
     monkeypatch.setenv('TERM', 'xterm')
     monkeypatch.setenv('COLUMNS', '80')
     master, slave = pty.openpty()
-    process = start(long_bag, tmp_path / 'out', stderr=slave)
+    process = start(long_bag, 'out', stderr=slave)
     os.close(slave)
     shown = read_to_end(master)
     output, _ = process.communicate(timeout=DEADLINE)

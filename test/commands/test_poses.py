@@ -66,30 +66,30 @@ def as_table(path):
         return dict(np.load(path))
     table = np.genfromtxt(path, delimiter=',', names=True)
     columns = {name: table[name] for name in table.dtype.names}
-    rows = Path(path).read_text().splitlines()[1:]
+    rows = PathPath(path).read_text().splitlines()[1:]
     times = [int(row.partition(',')[0].replace('.', '')) for row in rows]
     return {**columns, 'time_ns': np.array(times)}
 
 
 @pytest.mark.skipif(not RECORDINGS, reason='the recordings of rosbag2 are not there')
 @pytest.mark.parametrize('recording', RECORDINGS, ids=lambda path: path.name)
-def test_recordings_of_rosbag2_give_the_numbers_of_bag(tmp_path, recording):
+def test_recordings_of_rosbag2_give_the_numbers_of_bag(recording):
     assert len(RECORDINGS) == 12
-    add_foot_poses(recording, tmp_path / 'bag')
-    done = run_main('poses', recording, '-o', tmp_path / 'feet.npz')
+    add_foot_poses(recording, 'bag')
+    done = run_main('poses', recording, '-o', 'feet.npz')
     assert done.returncode == 0, done.stderr
-    assert_same(as_table(tmp_path / 'feet.npz'), tmp_path / 'bag')
+    assert_same(as_table('feet.npz'), 'bag')
 
 
 @pytest.mark.parametrize('name', ['feet.csv', 'feet.npz'])
-def test_a_row_has_what_a_message_gave(tmp_path, source, name):
-    add_foot_poses(source, tmp_path / 'bag')
-    done = run_main('poses', source, '-o', tmp_path / name)
+def test_a_row_has_what_a_message_gave(source, name):
+    add_foot_poses(source, 'bag')
+    done = run_main('poses', source, '-o', name)
     assert done.stdout == (
-        f'{tmp_path / name}: 100 rows, 75 poses of left_foot, 75 poses of right_foot\n'
+        f'{name}: 100 rows, 75 poses of left_foot, 75 poses of right_foot\n'
     )
-    table = as_table(tmp_path / name)
-    assert_same(table, tmp_path / 'bag')
+    table = as_table(name)
+    assert_same(table, 'bag')
     assert list(table)[-14:] == [
         f'{tip}_{column}' for tip in TIPS for column in POSE
     ] or (name == 'feet.csv')
@@ -100,11 +100,11 @@ def test_a_row_has_what_a_message_gave(tmp_path, source, name):
     )
 
 
-def test_without_a_file_it_goes_to_standard_output(tmp_path, source):
-    run_main('poses', source, '-o', tmp_path / 'feet.csv')
+def test_without_a_file_it_goes_to_standard_output(source):
+    run_main('poses', source, '-o', 'feet.csv')
     for words in ((), ('-o', '-')):
         done = run_main('poses', source, *words)
-        assert done.stdout == (tmp_path / 'feet.csv').read_text()
+        assert done.stdout == Path('feet.csv').read_text()
     header, first, *_ = done.stdout.splitlines()
     assert header == 'time,' + ','.join(
         f'{tip}_{name}' for tip in TIPS for name in POSE
@@ -112,24 +112,24 @@ def test_without_a_file_it_goes_to_standard_output(tmp_path, source):
     assert first.startswith(f'{START // SECOND}.000000000,')
 
 
-def test_pandas_reads_it(tmp_path, source):
+def test_pandas_reads_it(source):
     pandas = pytest.importorskip('pandas')
     for name in ('feet.csv', 'feet.npz'):
-        run_main('poses', source, '-o', tmp_path / name)
-    text = pandas.read_csv(tmp_path / 'feet.csv')
-    arrays = pandas.DataFrame(dict(np.load(tmp_path / 'feet.npz')))
+        run_main('poses', source, '-o', name)
+    text = pandas.read_csv('feet.csv')
+    arrays = pandas.DataFrame(dict(np.load('feet.npz')))
     times = text.pop('time')
     pandas.testing.assert_series_equal(times, arrays['time'], rtol=0, atol=1e-9)
     pandas.testing.assert_frame_equal(text, arrays[text.columns], rtol=0, atol=1e-15)
 
 
-def test_twists_are_those_of_bag(tmp_path, source):
-    add_foot_poses(source, tmp_path / 'bag', twist=True)
-    done = run_main('poses', source, '-o', tmp_path / 'feet.npz', '--twist')
+def test_twists_are_those_of_bag(source):
+    add_foot_poses(source, 'bag', twist=True)
+    done = run_main('poses', source, '-o', 'feet.npz', '--twist')
     assert 'right_leg: no twist from 25 messages' in done.stderr
-    table = as_table(tmp_path / 'feet.npz')
+    table = as_table('feet.npz')
     expected = []
-    for _, message in poses_of(read_bag(tmp_path / 'bag')[1], LEFT_TWIST, TWIST):
+    for _, message in poses_of(read_bag('bag')[1], LEFT_TWIST, TWIST):
         v, w = message.twist.linear, message.twist.angular
         expected.append((v.x, v.y, v.z, w.x, w.y, w.z))
     found = np.stack(
@@ -139,7 +139,7 @@ def test_twists_are_those_of_bag(tmp_path, source):
     np.testing.assert_allclose(found[:, there].T, expected, rtol=0, atol=1e-15)
 
 
-def test_messages_of_one_time_are_one_row_but_not_those_of_a_loop(tmp_path):
+def test_messages_of_one_time_are_one_row_but_not_those_of_a_loop():
     """Two publishers, the right one a little later; then all again, as a looping bag has it."""
     rows = {'left': [], 'right': []}
     for i in range(200):
@@ -148,14 +148,14 @@ def test_messages_of_one_time_are_one_row_but_not_those_of_a_loop(tmp_path):
         rows['left'].append((time, joint_state(stamp, LEGS[:6])))
         rows['right'].append((time + 25_000_000, joint_state(stamp, LEGS[6:])))
     source = write_topics(
-        tmp_path / 'in',
+        'in',
         {f'/{leg}': (JOINT_STATE, [], messages) for leg, messages in rows.items()},
     )
     done = run_main(
-        'poses', source, '--joint-topic', '/left', '/right', '-o', tmp_path / 'feet.npz'
+        'poses', source, '--joint-topic', '/left', '/right', '-o', 'feet.npz'
     )
     assert 'time stepped back' in done.stderr
-    table = as_table(tmp_path / 'feet.npz')
+    table = as_table('feet.npz')
     times = (table['time_ns'] - START) / 1e7
     assert (
         200 <= len(times) <= 206
@@ -165,13 +165,13 @@ def test_messages_of_one_time_are_one_row_but_not_those_of_a_loop(tmp_path):
     assert np.isfinite(table['right_foot_x'][:90]).all()
 
 
-def test_the_notes_are_those_of_bag(tmp_path):
+def test_the_notes_are_those_of_bag():
     joints = [
         (time, joint_state(time, positions=[60.0] * 12, frame_id=f'robot{i % 2}/base'))
         for i, (time, _) in enumerate(walk(20))
     ]
-    source = write_bag(tmp_path / 'in', joints=joints)
-    summary = add_foot_poses(source, tmp_path / 'bag')
+    source = write_bag('in', joints=joints)
+    summary = add_foot_poses(source, 'bag')
     done = run_main('poses', source)
     assert len(summary.warnings) >= 6
     assert done.stderr == ''.join(
@@ -191,13 +191,13 @@ def test_the_notes_are_those_of_bag(tmp_path):
         (['--time-unit', 'h'], "invalid choice: 'h'"),
     ],
 )
-def test_wrong_words_are_one_line(tmp_path, monkeypatch, source, words, complaint):
+def test_wrong_words_are_one_line(monkeypatch, source, words, complaint):
     monkeypatch.chdir(tmp_path)
     assert_one_line_complaint(run_main('poses', source, *words), complaint)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_recording_without_a_pose_leaves_nothing(tmp_path, monkeypatch):
+def test_a_recording_without_a_pose_leaves_nothing(monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_bag(
         Path('in'), joints=[(START, joint_state(START, ['L_KNEE']))], others=False
@@ -210,7 +210,7 @@ def test_a_recording_without_a_pose_leaves_nothing(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize('command', ['plot', 'poses'])
-def test_memory_hardly_grows_with_a_recording(tmp_path, command):
+def test_memory_hardly_grows_with_a_recording(command):
     """Peak resident size, for a recording at 1 kHz and one of twice its length.
 
     Both are just so long that the rows that plot keeps have been halved in number once more.
@@ -230,7 +230,7 @@ def test_memory_hardly_grows_with_a_recording(tmp_path, command):
             for i in range(seconds)
             for time, data in walked
         ]
-        source = write_bag(tmp_path / f'{seconds}', joints=joints, others=False)
+        source = write_bag(f'{seconds}', joints=joints, others=False)
         done = subprocess.run(
             [
                 sys.executable,
@@ -239,7 +239,7 @@ def test_memory_hardly_grows_with_a_recording(tmp_path, command):
                 command,
                 source,
                 '-o',
-                tmp_path / output,
+                output,
                 '--force',
             ],
             capture_output=True,
