@@ -34,6 +34,7 @@ TEST = [
     'hypothesis',
     'icub-models',
     'mcap',
+    'pandas',
     'pin',
     'playwright',
     'pytest>=7.4',

@@ -32,7 +32,8 @@ when it is complete. Of a CSV file or a directory of yarpdatadumper it gets the 
 examples:
   leg_fk bag walking walking_with_poses
   leg_fk bag walking.mcap walking_with_poses.mcap --version v1 --foot-frame sole
-  leg_fk bag two_robots with_poses --joint-topic /icub1/joint_states
+  leg_fk bag walking of_this_very_robot --description-from-topic
+  leg_fk bag two_robots with_poses --joint-topic /icub1/joint_states --joint-prefix icub1/
   leg_fk bag walking poses --only-poses --twist --tf --storage mcap
   leg_fk bag walking all_poses --chains left_leg right_leg head_imu=v2
   leg_fk bag monday/* --out-dir with_poses --jobs 4"""

@@ -29,6 +29,7 @@ time, and x, y, z [m], qx, qy, qz, qw of each tip in the root frame; empty where
 examples:
   leg_fk poses walking > feet.csv
   leg_fk poses walking.csv -o feet.npz
+  leg_fk poses walking -o legs.csv --description-from-topic --chains l_sole --root base_link
   leg_fk poses walking.mcap -o feet.csv --twist --version v1 --foot-frame sole
   leg_fk poses dump/torso dump/head --chains head_imu=v2
   leg_fk poses walking --joint-topic /icub/left_leg/joint_states /icub/right_leg/joint_states"""

@@ -160,7 +160,8 @@ class NpzTable:
 
     def write(self, stamps: NDArray[np.int64], values: Array) -> None:
         """Write (N,) times [ns] and (N, K) values, of which NaN are none."""
-        columns = (stamps, stamps / SECOND, *values.T)
+        sec, nanosec = np.divmod(stamps, SECOND)
+        columns = (stamps, sec + nanosec / SECOND, *values.T)  # rounded once
         for file, column in zip(self._files.values(), columns, strict=True):
             file.write(column.tobytes())
         self._rows += len(stamps)

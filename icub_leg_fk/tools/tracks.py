@@ -231,8 +231,11 @@ class _Trace:
         self._rows: list[Array] = []
         self._size = 1  # samples of a row
         self._outside: list[NDArray[np.uint8]] = []  # (K, 2 n), a bit per sample
-        R_zero = chain.poses(np.zeros((1, chain.n)))[0, 3:]
-        self._zero = R_zero * (-1.0, -1.0, -1.0, 1.0)  # which turns back from there
+        x, y, z, w = chain.pose(np.zeros(chain.n))[3:]
+        # The product of a quaternion and the inverse of that at q = 0.
+        self._from_zero = np.array(
+            [[w, -z, y, -x], [z, w, -x, -y], [-y, x, w, -z], [x, y, z, w]]
+        )
 
     def add(self, stamp: int, positions: Sequence[float]) -> None:
         """Take a sample: time [ns] and n joint positions."""
@@ -294,7 +297,7 @@ class _Trace:
 
     def _turns(self, quaternions: Array) -> Array:
         """Return (N, 3) roll, pitch and yaw [rad] from the orientation at q = 0."""
-        x, y, z, w = _product(quaternions.T, self._zero)
+        x, y, z, w = self._from_zero @ quaternions.T
         roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
         pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
         yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
@@ -341,15 +344,3 @@ def _seconds(stamps: NDArray[np.int64], start: int) -> list[float]:
     """Return times since a start [s]."""
     seconds: list[float] = ((stamps - start) / SECOND).tolist()
     return seconds
-
-
-def _product(one: Array, two: Array) -> tuple[Array, Array, Array, Array]:
-    """Return the (4, N) product of (4, N) quaternions x, y, z, w and one more."""
-    ax, ay, az, aw = one
-    bx, by, bz, bw = two
-    return (
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
-    )

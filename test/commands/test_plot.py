@@ -167,6 +167,8 @@ def test_from_and_to_cut_the_recording_and_what_is_drawn_is_named(walking_csv):
         'left foot',
         'right foot',
         'z (up) in root_link [m]',
+        'x (backward) in root_link [m]',
+        'path of a tip, 0.5 s before and after',
         'time [s]',
     } <= set(texts)
     for name in 'xyz':  # of the root, and of the feet where there is room

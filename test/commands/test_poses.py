@@ -1,18 +1,17 @@
 """`leg_fk poses`: the same numbers as `leg_fk bag` gives, as CSV text and for numpy."""
 
-import os
 from pathlib import Path
-import subprocess
-import sys
 
 from icub_leg_fk import add_foot_poses
 import numpy as np
 import pytest
 from support.bag_files import (
+    entries,
     JOINT_STATE,
     joint_state,
     LEFT_TWIST,
     LEGS,
+    numbers_of,
     poses_of,
     read_bag,
     SECOND,
@@ -22,7 +21,7 @@ from support.bag_files import (
     write_bag,
     write_topics,
 )
-from support.leg_fk_process import assert_one_line_complaint, run_main
+from support.leg_fk_process import assert_one_line_complaint, peak_of, run_main
 from support.recorded_walk import SHARED
 
 POSE = ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
@@ -30,6 +29,12 @@ RECORDINGS = sorted(
     path.parent for path in SHARED.glob('rosbag2_jazzy/*/metadata.yaml')
 )
 TIPS = ('left_foot', 'right_foot')
+COLUMNS = [f'{tip}_{name}' for tip in TIPS for name in POSE]
+
+
+@pytest.fixture(autouse=True)
+def in_directory(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
 
 
 @pytest.fixture(scope='module')
@@ -47,17 +52,14 @@ def assert_same(table, bag):
     _, messages = read_bag(bag)
     for tip in TIPS:
         poses = poses_of(messages, f'/foot_pose_publisher/{tip}/pose')
-        expected = []
-        stamps = []
-        for _, message in poses:
-            p, q = message.pose.position, message.pose.orientation
-            expected.append((p.x, p.y, p.z, q.x, q.y, q.z, q.w))
-            stamp = message.header.stamp
-            stamps.append(stamp.sec * SECOND + stamp.nanosec)
+        stamps = [message.header.stamp for _, message in poses]
         there = np.isfinite(table[f'{tip}_x'])
+        assert table['time_ns'][there].tolist() == [
+            stamp.sec * SECOND + stamp.nanosec for stamp in stamps
+        ]
+        expected = [numbers_of(message.pose) for _, message in poses]
         found = np.stack([table[f'{tip}_{name}'][there] for name in POSE], axis=1)
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-15)
-        assert table['time_ns'][there].tolist() == stamps
 
 
 def as_table(path):
@@ -73,183 +75,141 @@ def as_table(path):
 
 @pytest.mark.skipif(not RECORDINGS, reason='the recordings of rosbag2 are not there')
 @pytest.mark.parametrize('recording', RECORDINGS, ids=lambda path: path.name)
-def test_recordings_of_rosbag2_give_the_numbers_of_bag(tmp_path, recording):
+def test_recordings_of_rosbag2_give_the_numbers_of_bag(recording):
     assert len(RECORDINGS) == 12
-    add_foot_poses(recording, tmp_path / 'bag')
-    done = run_main('poses', recording, '-o', tmp_path / 'feet.npz')
+    add_foot_poses(recording, 'bag')
+    done = run_main('poses', recording, '-o', 'feet.npz')
     assert done.returncode == 0, done.stderr
-    assert_same(as_table(tmp_path / 'feet.npz'), tmp_path / 'bag')
+    assert_same(as_table('feet.npz'), 'bag')
 
 
 @pytest.mark.parametrize('name', ['feet.csv', 'feet.npz'])
-def test_a_row_has_what_a_message_gave(tmp_path, source, name):
-    add_foot_poses(source, tmp_path / 'bag')
-    done = run_main('poses', source, '-o', tmp_path / name)
+def test_a_row_has_what_a_message_gave(source, name):
+    add_foot_poses(source, 'bag')
+    done = run_main('poses', source, '-o', name)
     assert done.stdout == (
-        f'{tmp_path / name}: 100 rows, 75 poses of left_foot, 75 poses of right_foot\n'
+        f'{name}: 100 rows, 75 poses of left_foot, 75 poses of right_foot\n'
     )
-    table = as_table(tmp_path / name)
-    assert_same(table, tmp_path / 'bag')
-    assert list(table)[-14:] == [
-        f'{tip}_{column}' for tip in TIPS for column in POSE
-    ] or (name == 'feet.csv')
-    assert (
-        np.isnan(table['left_foot_x']).sum()
-        == np.isnan(table['right_foot_qw']).sum()
-        == 25
-    )
+    table = as_table(name)
+    assert_same(table, 'bag')
+    assert [each for each in table if '_foot_' in each] == COLUMNS
+    for column in ('left_foot_x', 'right_foot_qw'):
+        assert np.isnan(table[column]).sum() == 25
 
 
-def test_without_a_file_it_goes_to_standard_output(tmp_path, source):
-    run_main('poses', source, '-o', tmp_path / 'feet.csv')
+def test_without_a_file_it_goes_to_standard_output(source):
+    run_main('poses', source, '-o', 'feet.csv')
     for words in ((), ('-o', '-')):
         done = run_main('poses', source, *words)
-        assert done.stdout == (tmp_path / 'feet.csv').read_text()
+        assert done.stdout == Path('feet.csv').read_text()
     header, first, *_ = done.stdout.splitlines()
-    assert header == 'time,' + ','.join(
-        f'{tip}_{name}' for tip in TIPS for name in POSE
-    )
+    assert header.split(',') == ['time', *COLUMNS]
     assert first.startswith(f'{START // SECOND}.000000000,')
 
 
-def test_pandas_reads_it(tmp_path, source):
+def test_pandas_reads_it(source):
     pandas = pytest.importorskip('pandas')
     for name in ('feet.csv', 'feet.npz'):
-        run_main('poses', source, '-o', tmp_path / name)
-    text = pandas.read_csv(tmp_path / 'feet.csv')
-    arrays = pandas.DataFrame(dict(np.load(tmp_path / 'feet.npz')))
-    pandas.testing.assert_frame_equal(text, arrays[text.columns], rtol=0, atol=1e-9)
+        run_main('poses', source, '-o', name)
+    text = pandas.read_csv('feet.csv')
+    arrays = pandas.DataFrame(dict(np.load('feet.npz')))
+    times = text.pop('time')
+    pandas.testing.assert_series_equal(times, arrays['time'], rtol=0, atol=1e-9)
+    pandas.testing.assert_frame_equal(text, arrays[text.columns], rtol=0, atol=1e-15)
 
 
-def test_twists_are_those_of_bag(tmp_path, source):
-    add_foot_poses(source, tmp_path / 'bag', twist=True)
-    done = run_main('poses', source, '-o', tmp_path / 'feet.npz', '--twist')
+def test_twists_are_those_of_bag(source):
+    add_foot_poses(source, 'bag', twist=True)
+    done = run_main('poses', source, '-o', 'feet.npz', '--twist')
     assert 'right_leg: no twist from 25 messages' in done.stderr
-    table = as_table(tmp_path / 'feet.npz')
-    expected = []
-    for _, message in poses_of(read_bag(tmp_path / 'bag')[1], LEFT_TWIST, TWIST):
-        v, w = message.twist.linear, message.twist.angular
-        expected.append((v.x, v.y, v.z, w.x, w.y, w.z))
-    found = np.stack(
-        [table[f'left_foot_{name}'] for name in ('vx', 'vy', 'vz', 'wx', 'wy', 'wz')]
-    )
-    there = np.isfinite(found[0])
-    np.testing.assert_allclose(found[:, there].T, expected, rtol=0, atol=1e-15)
+    table = as_table('feet.npz')
+    twists = poses_of(read_bag('bag')[1], LEFT_TWIST, TWIST)
+    expected = [numbers_of(message.twist) for _, message in twists]
+    names = ('vx', 'vy', 'vz', 'wx', 'wy', 'wz')
+    found = np.stack([table[f'left_foot_{name}'] for name in names], axis=1)
+    there = np.isfinite(found[:, 0])
+    np.testing.assert_allclose(found[there], expected, rtol=0, atol=1e-15)
 
 
-def test_messages_of_one_time_are_one_row_but_not_those_of_a_loop(tmp_path):
+def test_messages_of_one_time_are_one_row_but_not_those_of_a_loop():
     """Two publishers, the right one a little later; then all again, as a looping bag has it."""
-    rows = {'left': [], 'right': []}
-    for i in range(200):
-        stamp = START + 10**7 * (i % 100)
-        time = START + 10**7 * i
-        rows['left'].append((time, joint_state(stamp, LEGS[:6])))
-        rows['right'].append((time + 25_000_000, joint_state(stamp, LEGS[6:])))
-    source = write_topics(
-        tmp_path / 'in',
-        {f'/{leg}': (JOINT_STATE, [], messages) for leg, messages in rows.items()},
-    )
-    done = run_main(
-        'poses', source, '--joint-topic', '/left', '/right', '-o', tmp_path / 'feet.npz'
-    )
+    topics = {}
+    for leg, names, late in (('left', LEGS[:6], 0), ('right', LEGS[6:], 25_000_000)):
+        messages = []
+        for i in range(200):
+            data = joint_state(START + 10**7 * (i % 100), names)
+            messages.append((START + 10**7 * i + late, data))
+        topics[f'/{leg}'] = (JOINT_STATE, [], messages)
+    write_topics('in', topics)
+    done = run_main('poses', 'in', '--joint-topic', *topics, '-o', 'feet.npz')
     assert 'time stepped back' in done.stderr
-    table = as_table(tmp_path / 'feet.npz')
+    table = as_table('feet.npz')
     times = (table['time_ns'] - START) / 1e7
-    assert (
-        200 <= len(times) <= 206
-    )  # some of the right are alone where the loop begins again
+    # Some of the right are alone where the loop begins again.
+    assert 200 <= len(times) <= 206
     assert times[:90].tolist() == list(range(90))
     assert np.isfinite(table['left_foot_x']).sum() == 200
     assert np.isfinite(table['right_foot_x'][:90]).all()
 
 
-def test_the_notes_are_those_of_bag(tmp_path):
+def test_the_notes_are_those_of_bag():
     joints = [
         (time, joint_state(time, positions=[60.0] * 12, frame_id=f'robot{i % 2}/base'))
         for i, (time, _) in enumerate(walk(20))
     ]
-    source = write_bag(tmp_path / 'in', joints=joints)
-    summary = add_foot_poses(source, tmp_path / 'bag')
-    done = run_main('poses', source)
-    assert len(summary.warnings) >= 6
-    assert done.stderr == ''.join(
-        f'leg_fk: warning: {line}\n' for line in summary.warnings
-    )
+    write_bag('in', joints=joints)
+    warnings = add_foot_poses('in', 'bag').warnings
+    assert len(warnings) >= 6
+    lines = [f'leg_fk: warning: {line}\n' for line in warnings]
+    assert run_main('poses', 'in').stderr == ''.join(lines)
 
 
 @pytest.mark.parametrize(
     ('words', 'complaint'),
     [
-        (['-o', 'feet.txt'], 'feet.txt: found .txt, allowed: .csv, .npz'),
-        (['-o', 'none/feet.csv'], 'there is no directory'),
-        (['--output=-feet.csv'], './-feet.csv'),
-        (['--chains', 'arm'], "unknown chain 'arm'"),
-        (['--version', 'v9'], "'v9'"),
-        (['--foot-frame', 'toe'], "'toe'"),
-        (['--time-unit', 'h'], "invalid choice: 'h'"),
+        ('-o feet.txt', 'feet.txt: found .txt, allowed: .csv, .npz'),
+        ('-o none/feet.csv', 'there is no directory'),
+        ('--output=-feet.csv', './-feet.csv'),
+        ('--chains arm', "unknown chain 'arm'"),
+        ('--version v9', "'v9'"),
+        ('--foot-frame toe', "'toe'"),
+        ('--time-unit h', "invalid choice: 'h'"),
     ],
 )
-def test_wrong_words_are_one_line(tmp_path, monkeypatch, source, words, complaint):
-    monkeypatch.chdir(tmp_path)
-    assert_one_line_complaint(run_main('poses', source, *words), complaint)
-    assert list(tmp_path.iterdir()) == []
+def test_wrong_words_are_one_line(source, words, complaint):
+    assert_one_line_complaint(run_main('poses', source, *words.split()), complaint)
+    assert entries('.') == []
 
 
-def test_a_recording_without_a_pose_leaves_nothing(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    write_bag(
-        Path('in'), joints=[(START, joint_state(START, ['L_KNEE']))], others=False
-    )
+def test_a_recording_without_a_pose_leaves_nothing():
+    write_bag('in', joints=[(START, joint_state(START, ['L_KNEE']))], others=False)
     for words in ((), ('-o', 'feet.csv'), ('-o', 'feet.npz')):
         assert_one_line_complaint(
             run_main('poses', 'in', *words), 'no chain has a pose: left_leg'
         )
-    assert [path.name for path in tmp_path.iterdir()] == ['in']
+    assert entries('.') == ['in']
 
 
 @pytest.mark.parametrize('command', ['plot', 'poses'])
-def test_memory_hardly_grows_with_a_recording(tmp_path, command):
+def test_memory_hardly_grows_with_a_recording(command):
     """Peak resident size, for a recording at 1 kHz and one of twice its length.
 
     Both are just so long that the rows that plot keeps have been halved in number once more.
     Large blocks go back to the system at once, else the peaks differ by 20 MB from run to run.
     """
-    code = (
-        'import sys; from icub_leg_fk.__main__ import main; status = main(); '
-        'peak, = (line for line in open("/proc/self/status") if line.startswith("VmHWM")); '
-        'print(peak.split()[1], file=sys.stderr); sys.exit(status)'
-    )
-    peaks = []
     output = {'plot': 'x.png', 'poses': 'x.npz'}[command]
+    at_once = {'MALLOC_MMAP_THRESHOLD_': '65536'}
+    walked = walk(1000, rate=1000.0, names=LEGS)
+    peaks = []
     for seconds in (132, 264):
-        walked = walk(1000, rate=1000.0, names=LEGS)
-        joints = [
-            (time + SECOND * i, data[:4] + stamp_of(time + SECOND * i) + data[12:])
-            for i in range(seconds)
-            for time, data in walked
-        ]
-        source = write_bag(tmp_path / f'{seconds}', joints=joints, others=False)
-        done = subprocess.run(
-            [
-                sys.executable,
-                '-c',
-                code,
-                command,
-                source,
-                '-o',
-                tmp_path / output,
-                '--force',
-            ],
-            capture_output=True,
-            text=True,
-            timeout=300,
-            env={**os.environ, 'MALLOC_MMAP_THRESHOLD_': '65536'},
-        )
-        assert done.returncode == 0, done
-        peaks.append(int(done.stderr.split()[-1]) / 1000)
+        joints = []
+        for i in range(seconds):
+            for time, data in walked:
+                now = time + SECOND * i
+                stamp = np.array(divmod(now, SECOND), dtype='<u4').tobytes()
+                joints.append((now, data[:4] + stamp + data[12:]))
+        write_bag(f'{seconds}', joints=joints, others=False)
+        words = (command, seconds, '-o', output, '--force')
+        peaks.append(peak_of(*words, environment=at_once))
     assert peaks[1] < 200, peaks  # MB
     assert peaks[1] - peaks[0] < 5, peaks  # 132,000 samples of two legs are 15 MB
-
-
-def stamp_of(time):
-    return np.array(divmod(time, SECOND), dtype='<u4').tobytes()

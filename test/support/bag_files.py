@@ -1,5 +1,6 @@
 """Bags for tests, written and read with rosbags (which shares no code with `leg_fk bag`)."""
 
+from dataclasses import astuple
 from pathlib import Path
 
 from icub_leg_fk.kinematics import load_chain
@@ -137,7 +138,13 @@ def write_topics(path, topics, storage='mcap', compression=None):
             rows += [(connection, time, data) for time, data in messages]
         for row in sorted(rows, key=lambda row: row[1]):
             writer.write(*row)
-    return path
+    return Path(path)
+
+
+def numbers_of(part):
+    """Return the numbers of a message: x, y, z, qx, qy, qz, qw of a Pose or a Transform."""
+    triples = [each for each in astuple(part) if isinstance(each, tuple)]
+    return [value for each in triples for value in each if isinstance(value, float)]
 
 
 def read_bag(path):

@@ -22,6 +22,29 @@ def leg_fk(*words, environment=None):
     )
 
 
+def run_code(code, *words, environment=None):
+    """Run Python code with some arguments; return the finished process."""
+    return subprocess.run(
+        [sys.executable, '-c', code, *map(str, words)],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        env={**os.environ, **(environment or {})},
+    )
+
+
+def peak_of(*words, environment=None):
+    """Run `leg_fk` in a process of its own; return the peak of its resident size [MB]."""
+    code = (
+        'import sys; from icub_leg_fk.__main__ import main; status = main(); '
+        'peak, = (line for line in open("/proc/self/status") if line.startswith("VmHWM")); '
+        'print(peak.split()[1], file=sys.stderr); sys.exit(status)'
+    )
+    done = run_code(code, *words, environment=environment)
+    assert done.returncode == 0, done
+    return int(done.stderr.split()[-1]) / 1000
+
+
 def run_main(*words):
     """Run `leg_fk` in this process; return what it would leave as a process of its own."""
     out, err = io.StringIO(), io.StringIO()
