@@ -15,11 +15,11 @@ import webbrowser
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from icub_leg_fk.kinematics import Chain, DHLink, load_chain
+from icub_leg_fk.kinematics import Catalog, Chain, DHLink, load_chain
 from icub_leg_fk.kinematics.rotation import turns_about
 from icub_leg_fk.tools.tracks import read_tracks, track_of
 from icub_leg_fk.tools.viewer import PERIOD, Viewer
-from icub_leg_fk.tools.viewer_live import live_robot, LiveRobot
+from icub_leg_fk.tools.viewer_live import following, LiveRobot
 from icub_leg_fk.tools.viewer_method import arc, Method, STEPS
 from icub_leg_fk.tools.viewer_page import (
     roll_pitch_yaw,
@@ -47,6 +47,7 @@ from support.leg_fk_process import assert_one_line_complaint, COMMAND, run_main
 
 EXAMPLES = Path(__file__).resolve().parents[2] / 'config' / 'examples'
 WALK = EXAMPLES / 'synthetic_walk.csv'
+PANDA = EXAMPLES / 'panda.yaml'
 LEG_JOINTS = [
     f'{side}_{joint}'
     for side in 'lr'
@@ -251,8 +252,8 @@ def test_a_live_robot_is_shown_by_its_description(page_of):
     assert shown_numbers(page) == numbers_of_pose('left_leg=v1', BENT)
 
 
-def select_left_leg(catalog):
-    return catalog.select(['left_leg'])
+def select_left_leg(urdf):
+    return Catalog.from_urdf(urdf).select(['left_leg'])
 
 
 def test_the_page_is_opened_and_its_address_printed(monkeypatch):
@@ -296,6 +297,8 @@ def test_the_page_is_updated_at_most_30_times_a_second(server, monkeypatch):
         (['--host', '192.0.2.1'], "--host: found '192.0.2.1'"),
         (['--port', '99999'], "found '99999', allowed: 1 to"),
         (['--joint-topic', '/x'], '--joint-topic goes with --recording or --live'),
+        (['--description-from-topic'], 'topic goes with --recording or --live'),
+        (['--live', '--description-from-topic', '-k', PANDA], 'without a kinematics'),
         (['--recording', 'none.csv'], 'none.csv: there is no such file'),
         (['--recording', WALK, WALK], 'brings joint l_hip_pitch, and so does'),
         (['--recording', 'a.csv', '--live'], 'not allowed with'),
@@ -345,7 +348,8 @@ def test_a_live_robot_moves_the_chains():
         name=['other', *chain.joint_names], position=[9.0, *BENT]
     )
     deadline = time.monotonic() + 10.0
-    with live_robot([chain], ['view_test/joint_states'], select_left_leg) as robot:
+    robot = LiveRobot([chain], ['view_test/joint_states'], select_left_leg)
+    with following(robot):
         robot.add_controls(MagicMock(), None)
         [posture] = robot.step()
         assert posture.q is None
@@ -361,7 +365,7 @@ def test_a_live_robot_moves_the_chains():
 
 # What is drawn, and said, without a page.
 
-FILES = {'panda': EXAMPLES / 'panda.yaml', 'arm': EXAMPLES / 'cylindrical_arm.yaml'}
+FILES = {'panda': PANDA, 'arm': EXAMPLES / 'cylindrical_arm.yaml'}
 
 each_kind = pytest.mark.parametrize('name', ['left_leg', 'right_leg', 'panda', 'arm'])
 
@@ -571,12 +575,15 @@ def test_the_newest_sample_is_shown_and_how_old_it_is():
     np.testing.assert_allclose(trail[:, 2], [0.2, 0.3])
 
 
-def test_a_recording_with_a_clock_that_was_set_is_shown_in_order():
+def test_a_recording_is_shown_in_the_order_of_time_by_the_description_that_counted():
     times, positions = np.array([1.0, 3.0, 2.0]), np.zeros((3, 6))
-    positions[:, 3] = [0.1, 0.3, 0.2]
-    recording = Recording([track_of(LEGS[0], times, positions)])
+    positions[:, 3] = [0.1, 0.3, 0.2]  # the clock was set
+    tracks = [track_of(LEGS[0], times, positions)]
+    tracks.append(track_of(load_chain('left_leg', 'v1'), times[:1] + 4, positions[:1]))
+    recording = Recording(tracks)
     gui = MagicMock()
     recording.add_controls(gui, None)
-    gui.add_slider.return_value.value = 2.4
-    [posture] = recording.step()
-    assert posture.q[3] == 0.2
+    for at, knee, version in ((2.4, 0.2, 'v2_5'), (5.0, 0.1, 'v1')):
+        gui.add_slider.return_value.value = at
+        [posture] = recording.step()
+        assert (posture.q[3], recording.chains[0].version) == (knee, version)
