@@ -155,9 +155,13 @@ def viewer(node: str, params_file: str, given: Mapping[str, Any]) -> list[Node]:
             values |= parameters_for(params_file, node)
         values |= given
         ours = {parameter.name: values[parameter.name] for parameter in PARAMETERS}
-        catalog = load_catalog(ours['kinematics_file'], ours['root_frame'])
+        file, root_frame = ours['kinematics_file'], ours['root_frame']
+        is_described = ours['description_from_topic']
+        catalog = None if is_described else load_catalog(file, root_frame)
         configuration = configuration_of(catalog, ours)
     except (LegFKError, TypeError, AttributeError):  # the node says what is wrong
+        return []
+    if is_described and file:  # which it refuses as well
         return []
     try:
         get_package_prefix('rviz2')
@@ -166,14 +170,14 @@ def viewer(node: str, params_file: str, given: Mapping[str, Any]) -> list[Node]:
         return []
     with NamedTemporaryFile(
         'w', prefix='foot_poses_', suffix='.rviz', delete=False
-    ) as file:
-        file.write(rviz_config(configuration, node))
+    ) as config:
+        config.write(rviz_config(configuration, node, root_frame))
     return [
         Node(
             package='rviz2',
             executable='rviz2',
             name='foot_poses_rviz',
-            arguments=['-d', file.name],
+            arguments=['-d', config.name],
         )
     ]
 

@@ -9,12 +9,13 @@ import sys
 import webbrowser
 
 from icub_leg_fk.errors import LegFKError
-from icub_leg_fk.kinematics import Chain
+from icub_leg_fk.kinematics import Catalog, Chain, Urdf
 from icub_leg_fk.tools import options
 from icub_leg_fk.tools.progress import shown_progress
+from icub_leg_fk.tools.recorded_robot import recorded_chains, refuse_second_source
 from icub_leg_fk.tools.tracks import read_tracks
 from icub_leg_fk.tools.viewer import Viewer
-from icub_leg_fk.tools.viewer_live import live_robot, Select
+from icub_leg_fk.tools.viewer_live import following, LiveRobot
 from icub_leg_fk.tools.viewer_page import running_server
 from icub_leg_fk.tools.viewer_recording import Recording
 from icub_leg_fk.tools.viewer_scene import axis_names
@@ -45,12 +46,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs='*',
         help='chains, such as left_leg or head_imu=v2 (default: both legs)',
     )
-    options.add(parser, '--version', '--foot-frame', '--kinematics-file')
+    options.add(parser, '--version', '--foot-frame', '--kinematics-file', '--root')
     source = parser.add_mutually_exclusive_group()
     source.add_argument(
         '--recording',
         metavar='FILE',
         nargs='+',
+        type=options.path,
         help='play bags, CSV files or logs of YARP; several are parts of one robot',
     )
     source.add_argument(
@@ -59,7 +61,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='follow the joint states of a running robot, and its description unless '
         '-k or a version is given (needs ROS 2)',
     )
-    options.add(parser, '--joint-topic', '--time-unit')
+    options.add(
+        parser,
+        '--joint-topic',
+        '--joint-prefix',
+        '--description-from-topic',
+        '--time-unit',
+    )
     parser.add_argument(
         '--host',
         metavar='ADDRESS',
@@ -80,26 +88,34 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Show the page until a signal ends it."""
-    if args.joint_topics and not (args.recording or args.live):
-        raise LegFKError('--joint-topic goes with --recording or --live')
-    chains: Sequence[Chain] = options.chains_of_one_root(args)
+    _refuse_topics(args)
     with ExitStack() as stack:
         server = stack.enter_context(running_server(args.host, args.port))
         source: Source | None = None
         if args.recording:
-            source = _recording(args, chains)
-            chains = source.chains
+            source = _recording(args)
         elif args.live:
-            robot = live_robot(chains, args.joint_topics, _select(args))
-            source = stack.enter_context(robot)
+            source = stack.enter_context(following(_robot(args)))
+        chains = source.chains if source else options.chains_of_one_root(args)
         viewer = Viewer(server, chains, source)
         _announce(chains, args, server.get_port())
         viewer.run()
     return 0
 
 
-def _recording(args: argparse.Namespace, chains: Sequence[Chain]) -> Recording:
+def _refuse_topics(args: argparse.Namespace) -> None:
+    """Refuse topics where there are none."""
+    if args.recording or args.live:
+        return
+    for option in ('joint_topics', 'description_from_topic'):
+        if getattr(args, option):
+            words = option.rstrip('s').replace('_', '-')
+            raise LegFKError(f'--{words} goes with --recording or --live')
+
+
+def _recording(args: argparse.Namespace) -> Recording:
     """Return the recording, with the chains that it moves."""
+    chains = recorded_chains(args)
     with shown_progress(Path(args.recording[0]).name) as progress:
         reading = read_tracks(
             args.recording,
@@ -107,17 +123,31 @@ def _recording(args: argparse.Namespace, chains: Sequence[Chain]) -> Recording:
             args.joint_topics,
             progress,
             time_unit=args.time_unit,
+            joint_prefix=args.joint_prefix,
         )
     options.print_notes(reading.warnings, reading.notes)
     return Recording(reading.tracks)
 
 
-def _select(args: argparse.Namespace) -> Select | None:
-    """Return what selects the chains of a description; None if a certain table is asked for."""
-    names = ' '.join(args.chains)
-    if args.kinematics_file or args.version or '=' in names:
-        return None
-    return lambda catalog: options.chains_of(catalog, args)
+def _robot(args: argparse.Namespace) -> LiveRobot:
+    """Return the robot; a table that is asked for is not replaced by a description."""
+
+    def select(urdf: Urdf) -> list[Chain]:
+        catalog = Catalog.from_urdf(urdf, root=args.root)
+        options.print_notes(catalog.warnings, [])
+        return options.chains_of(catalog, args)
+
+    topic = args.description_from_topic
+    if topic:
+        refuse_second_source(args.kinematics_file)
+    chains = options.chains_of_one_root(args)
+    is_table = args.kinematics_file or args.version or '=' in ' '.join(args.chains)
+    return LiveRobot(
+        chains,
+        args.joint_topics,
+        None if is_table else select,
+        topic if isinstance(topic, str) else '',
+    )
 
 
 def _announce(chains: Sequence[Chain], args: argparse.Namespace, port: int) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.tools import viewer_scene as drawn
-from icub_leg_fk.tools.viewer_method import Method, STEPS
+from icub_leg_fk.tools.viewer_method import LAST_STEP, Method
 from icub_leg_fk.tools.viewer_page import (
     Canvas,
     JointSliders,
@@ -133,7 +133,8 @@ class Viewer:
             self._words.show({'Move the slider to step 1.': []})
             return {}
         method, row = Method(posed, self._size), min(int(self._row.value), last_row)
-        self._words.show({f'Step {step}. {STEPS[step - 1]}': method.lines(step, row)})
+        words = method.words(step, row)
+        self._words.show({'as leg_fk explain prints it': words.splitlines()})
         return method.scene(step, row)
 
     def _shown_chain(self) -> int:
@@ -154,18 +155,18 @@ class Viewer:
                 with gui.add_folder(f'{chain.tip}: {chain.frame_id}'):
                     self._tips.append(Numbers(gui))
         with panel.add_tab('Method'):
-            marks = (
+            marks = [
                 (0, 'off'),
-                *((step, str(step)) for step in range(1, len(STEPS) + 1)),
-            )
-            self._step = gui.add_slider('step', 0, len(STEPS), 1, 0, marks=marks)
+                *((step, str(step)) for step in range(1, LAST_STEP + 1)),
+            ]
+            self._step = gui.add_slider('step', 0, LAST_STEP, 1, 0, marks=marks)
             self._chain = gui.add_dropdown('chain', self._names)
             self._row = gui.add_slider('row', 0, 1, 1, 0, visible=False)
             self._words = Numbers(gui)
         for control in (self._frames, self._step, self._chain, self._row):
             control.on_update(self._on_change)
         panel.dock_left()
-        panel.set_width(450)
+        panel.set_width(500)
 
     def _place_cameras(self, points: Array) -> None:
         """Look at (N, 3) points from ahead of the root, a little from the left and above."""

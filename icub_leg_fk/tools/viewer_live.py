@@ -9,8 +9,8 @@ from threading import Lock, Thread
 import time
 from typing import Any
 
-from icub_leg_fk.errors import LegFKError
-from icub_leg_fk.kinematics import Catalog, Chain, Urdf
+from icub_leg_fk.errors import LegFKError, ParameterError
+from icub_leg_fk.kinematics import Chain, Urdf
 from icub_leg_fk.stream.cdr import read_string
 from icub_leg_fk.stream.configuration import DEFAULT_TIMEOUT
 from icub_leg_fk.stream.joint_input import JointInput
@@ -31,7 +31,7 @@ _DEPTH = 100
 _LOOK_PERIOD = 1.0  # s
 _INTERVAL = TRAIL / TRAIL_POINTS  # s; a trail has no samples nearer to each other
 
-Select = Callable[[Catalog], Sequence[Chain]]
+Select = Callable[[Urdf], Sequence[Chain]]
 Samples = deque[tuple[float, Sequence[float]]]  # when they came [s], joint positions
 
 
@@ -41,12 +41,15 @@ class LiveRobot:
     Args:
         chains: the chains.
         topics: topics of the joint states; `joint_states` if none is named.
-        select: what selects the chains of a description of the robot, which then take the place of
+        select: what makes the chains of a description of the robot, which then take the place of
             those; None if no description is to be followed.
+        description_topic: topic of the description; if empty `robot_description` in the namespace
+            of the first topic of joint states.
 
     Attributes:
         topics: topics of the joint states.
-        description_topic: topic of the description, in the namespace of the first of these.
+        description_topic: topic of the description.
+        follows_description: whether a description is followed.
     """
 
     is_moving = True
@@ -56,11 +59,14 @@ class LiveRobot:
         chains: Sequence[Chain],
         topics: Sequence[str] = (),
         select: Select | None = None,
+        description_topic: str = '',
     ) -> None:
         self.topics = tuple(topics) or (_DEFAULT_TOPIC,)
         namespace, slash, _ = self.topics[0].rpartition('/')
-        self.description_topic = f'{namespace}{slash}robot_description'
+        beside = f'{namespace}{slash}robot_description'
+        self.description_topic = description_topic or beside
         self._topic = ' and '.join(self.topics)
+        self.follows_description = select is not None
         self._select = select
         self._description: bytes | None = None
         self._about: list[str] = []
@@ -69,7 +75,7 @@ class LiveRobot:
                 'the tables, until a description',
                 f'on {self.description_topic}',
             ]
-        self._doubts = ''
+        self._fault = ''
         self._lock = Lock()
         self._input = JointInput(time.time_ns)
         self._notes: list[Note] = []
@@ -127,19 +133,19 @@ class LiveRobot:
         assert self._select
         try:
             urdf = Urdf.parse(read_string(data), self.description_topic)
-            catalog = Catalog.from_urdf(urdf)
-            chains = tuple(self._select(catalog))
+            chains = tuple(self._select(urdf))
         except LegFKError as error:
-            self._doubts = f'description of the robot not used: {error}'
+            fault = error.fault if isinstance(error, ParameterError) else error
+            self._fault = f'description of the robot not used: {fault}'
         else:
             self._about = [f'the description of {urdf.name}', f'on {urdf.file}']
-            self._doubts = '; '.join(catalog.warnings)
+            self._fault = ''
             if chains != self.chains:
                 self._show(chains)
         self._say()
 
     def _say(self) -> None:
-        self._words.show({f'live from {self._topic}': self._about}, self._doubts)
+        self._words.show({f'live from {self._topic}': self._about}, self._fault)
 
     def _look(self) -> None:
         """Look at what there is to say of the messages."""
@@ -158,16 +164,13 @@ class LiveRobot:
 
 
 @contextmanager
-def live_robot(
-    chains: Sequence[Chain], topics: Sequence[str], select: Select | None
-) -> Iterator[LiveRobot]:
-    """Follow a running robot while it lasts; the arguments are those of `LiveRobot`.
+def following(robot: LiveRobot) -> Iterator[LiveRobot]:
+    """Let a robot take what comes over ROS 2 while it lasts.
 
     Raises:
         MissingDependencyError: rclpy is not installed.
         LegFKError: ROS 2 cannot be started, or a topic has no such name.
     """
-    robot = LiveRobot(chains, topics, select)
     with running_ros('view --live', 'leg_fk_view') as ros:
         qos = ros.rclpy.qos
         best_effort = qos.QoSProfile(
@@ -184,7 +187,7 @@ def live_robot(
             except ros.rclpy.exceptions.InvalidTopicNameException as error:
                 reason = str(error).splitlines()[0].rstrip(':').partition(': ')[2]
                 raise LegFKError(f'--joint-topic: found {topic!r}; {reason}') from error
-        if select:
+        if robot.follows_description:
             ros.node.create_subscription(
                 ros.string,
                 robot.description_topic,

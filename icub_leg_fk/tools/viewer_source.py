@@ -34,12 +34,14 @@ class Source(Protocol):
     """What moves the chains in place of the sliders.
 
     Attributes:
-        chains: the chains; a step may change them.
         is_moving: whether the joints may change without anything being done in the page.
     """
 
-    chains: tuple[Chain, ...]
     is_moving: bool
+
+    @property
+    def chains(self) -> tuple[Chain, ...]:
+        """The chains; a step may change them."""
 
     def add_controls(self, gui: Any, changed: Changed) -> None:
         """Add to the page what it is controlled by; `changed` is called when that is used."""

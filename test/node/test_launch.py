@@ -163,6 +163,9 @@ def test_arguments_reach_the_node(launched):
         'chains': '[left_leg, right_leg, head_imu=v2]',
         'frame_prefix': 'icub1/',
         'kinematics_file': '~/robot.yaml',
+        'description_from_topic': 'false',
+        'root_frame': 'base_link',
+        'joint_prefix': 'icub1/',
         'foot_frame': 'sole',
         'joint_timeout': '1',
         'stamp_source': 'now',
@@ -179,6 +182,7 @@ def test_arguments_reach_the_node(launched):
         '/foot_pose_publisher': given
         | {
             'chains': ['left_leg', 'right_leg', 'head_imu=v2'],
+            'description_from_topic': False,
             'joint_timeout': 1.0,
             'publish_tf': True,
             'publish_twist': True,
@@ -337,6 +341,24 @@ def test_rviz_shows_what_is_published(prefix, launched):
         '/lab/foot_pose_publisher/skeleton',
         '/lab/foot_pose_publisher/flange/pose',
     ]
+
+
+def test_rviz_waits_for_the_tips_of_a_description(launched):
+    given = {'chains': '[left_leg, toe]', 'description_from_topic': 'true'}
+    manager = rviz(launched(include(rviz='true', root_frame='base', **given)))
+    assert manager['Global Options']['Fixed Frame'] == 'base'
+    assert topics(manager) == [
+        f'/foot_pose_publisher/{name}'
+        for name in ('skeleton', 'left_foot/pose', 'toe/pose')
+    ]
+
+
+@pytest.mark.parametrize(
+    ('name', 'value'), [('version', 'v3'), ('kinematics_file', 'robot.urdf')]
+)
+def test_rviz_is_not_opened_for_what_the_node_refuses(launched, name, value):
+    given = {name: value, 'description_from_topic': 'true'}
+    assert 'STARTED rviz2' not in launched(include(rviz='true', **given))
 
 
 def test_without_rviz_the_node_runs(prefix, launched, monkeypatch):

@@ -59,8 +59,9 @@ def layout():
     return json.loads((CONFIG / 'foot_poses_foxglove.json').read_text())
 
 
-def rviz(configuration, node='/foot_pose_publisher'):
-    return yaml.safe_load(rviz_config(configuration, node))['Visualization Manager']
+def rviz(configuration, node='/foot_pose_publisher', root_frame=''):
+    text = rviz_config(configuration, node, root_frame)
+    return yaml.safe_load(text)['Visualization Manager']
 
 
 def test_every_panel_has_keys_that_are_read_and_a_title(layout):
@@ -123,3 +124,16 @@ def test_rviz_shows_a_robot_of_any_size_in_its_namespace_and_frames():
     assert 1.0 < view['Distance'] < 3.0  # m, for an arm of 1 m
     assert view['Focal Point']['Z'] > 0.3
     assert pose['Axes Length'] > 0.1 * view['Distance']
+
+
+def test_rviz_looks_for_the_tips_of_a_description_that_is_to_come():
+    awaited = Configuration.checked(
+        None, chains=['left_leg', 'sole link'], frame_prefix='a/'
+    )
+    manager = rviz(awaited, '/lab/feet', 'base')
+    assert [display['Name'] for display in manager['Displays'][-2:]] == [
+        'left_foot',
+        'sole_link',
+    ]
+    assert manager['Displays'][-1]['Topic']['Value'] == '/lab/feet/sole_link/pose'
+    assert manager['Global Options']['Fixed Frame'] == 'a/base'
