@@ -363,8 +363,8 @@ MISTAKES = [
     (
         '        T_nIs',
         '        virtual_link: {a: 1}\n        T_nIs',
-        f'14: {V1}: found key virtual_link, allowed: a last row of links instead, '
-        'such as {a: 0, d: 6.6, alpha: 90, offset: 0, type: fixed}',
+        f'24: {V1}: found key virtual_link, '
+        'allowed: a last row such as {a: 0, d: 6.6, alpha: 90, type: fixed} instead',
     ),
     (
         '        T_nIs',
