@@ -1,6 +1,7 @@
 """Errors of icub_leg_fk: each is named after its fault, carries its data and is a sentence."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from difflib import get_close_matches
 import reprlib
 
@@ -70,6 +71,7 @@ class VersionNeededError(LegFKError):
         )
 
 
+@dataclass(eq=False, repr=False)
 class JointVectorError(LegFKError):
     """Joint positions or velocities that cannot be computed with.
 
@@ -79,23 +81,20 @@ class JointVectorError(LegFKError):
         allowed: what may stand there.
     """
 
-    def __init__(self, quantity: str, fault: str, allowed: str) -> None:
-        self.quantity = quantity
-        self.fault = fault
-        self.allowed = allowed
-        super().__init__(quantity, fault, allowed)
+    quantity: str
+    fault: str
+    allowed: str
 
     def __str__(self) -> str:
         return f'{self.quantity} {self.fault}; allowed: {self.allowed}'
 
 
+@dataclass(eq=False, repr=False)
 class _FileError(LegFKError):
     """What errors of files share: the file and what is wrong with it."""
 
-    def __init__(self, file: str, fault: str) -> None:
-        self.file = file
-        self.fault = fault
-        super().__init__(file, fault)
+    file: str
+    fault: str
 
     def __str__(self) -> str:
         return f'{self.file}: {self.fault}'
@@ -131,7 +130,6 @@ class CatalogError(InputFileError):
         self.where = where
         self.found = found
         self.allowed = allowed
-        self.args = (file, line, where, found, allowed)
 
     def __str__(self) -> str:
         if not self.where:
@@ -149,6 +147,7 @@ class OutputFileError(_FileError):
     """
 
 
+@dataclass(eq=False, repr=False)
 class MalformedMessageError(LegFKError):
     """Bytes that are not a well-formed CDR message of the expected type.
 
@@ -157,15 +156,14 @@ class MalformedMessageError(LegFKError):
         fault: what is wrong with it, and where.
     """
 
-    def __init__(self, message: str, fault: str) -> None:
-        self.message = message
-        self.fault = fault
-        super().__init__(message, fault)
+    message: str
+    fault: str
 
     def __str__(self) -> str:
         return f'{self.message}: {self.fault}'
 
 
+@dataclass(eq=False, repr=False)
 class ParameterError(LegFKError):
     """A parameter of the node that cannot be used.
 
@@ -174,15 +172,14 @@ class ParameterError(LegFKError):
         fault: what is wrong with it, and what is allowed.
     """
 
-    def __init__(self, parameter: str, fault: str) -> None:
-        self.parameter = parameter
-        self.fault = fault
-        super().__init__(parameter, fault)
+    parameter: str
+    fault: str
 
     def __str__(self) -> str:
         return f'parameter {self.parameter}: {self.fault}'
 
 
+@dataclass(eq=False, repr=False)
 class MissingDependencyError(LegFKError):
     """An optional library that a command needs is not installed.
 
@@ -192,11 +189,9 @@ class MissingDependencyError(LegFKError):
         install: the line that installs it.
     """
 
-    def __init__(self, library: str, purpose: str, install: str) -> None:
-        self.library = library
-        self.purpose = purpose
-        self.install = install
-        super().__init__(library, purpose, install)
+    library: str
+    purpose: str
+    install: str
 
     def __str__(self) -> str:
         return f'{self.purpose} needs {self.library}, which is not installed: {self.install}'

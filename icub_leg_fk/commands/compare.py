@@ -252,12 +252,16 @@ def _summary(row: FrameComparison, rows: Sequence[FrameComparison]) -> str:
             words += ', and it is another mechanism'
         elif fitted and fitted.mm <= 0.2 * direct.mm:
             words += f', most of it a shift of its ends ({_short(fitted.mm)} mm fitted)'
-    for other in rows:
-        if other.turn and _id(other.chain) == _id(chain):
-            words += (
-                f'; its {other.chain.frame_id} has other axes, turned by {other.turn}'
-            )
-    return f'{chain.name}: {words}'
+    return f'{chain.name}: {words}{_other_axes(chain, rows)}'
+
+
+def _other_axes(chain: Chain, rows: Sequence[FrameComparison]) -> str:
+    """Return which frames of a version have other axes than the robot's of their name."""
+    words = ''
+    for other, _, turn, *_ in rows:
+        if turn and _id(other) == _id(chain):
+            words += f'; its {other.frame_id} has other axes, turned by {turn}'
+    return words
 
 
 def _id(chain: Chain) -> str:

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 import math
 from pathlib import Path
-from typing import TypeVar
 
 from icub_leg_fk.kinematics.chain import Chain, TipFrame
 from icub_leg_fk.kinematics.frozen import Frozen
 from icub_leg_fk.kinematics.link import CONVENTIONS, DHLink, JOINT_TYPES, standard_rows
 from icub_leg_fk.kinematics.rotation import Array, is_rigid_transform, nearest_rotation
-from icub_leg_fk.kinematics.yaml_fields import Field, FRAME_ID, read_yaml, WORD
+from icub_leg_fk.kinematics.yaml_fields import Field, FRAME_ID, read_yaml, Record, WORD
 import numpy as np
-
-_Value = TypeVar('_Value')
-_Default = TypeVar('_Default')
 
 _LENGTHS = ('mm', 'm')
 _ANGLES = ('deg', 'rad')
@@ -43,7 +39,10 @@ _REPLACEABLE = (*_PLACE, 'root_axes')
 _VERSION = ('T_Ro0', 'T_nIs', 'convention', 'source', *_REPLACEABLE)
 _ROW = ('offset', 'range', 'robot_range', 'type', 'gain', 'joint', 'erratum')
 _OF_A_JOINT = ('range', 'robot_range', 'gain', 'joint')
-_OTHER_NAMES = {'sign': 'gain', 'theta': 'offset'}  # what people write for a row's keys
+_IN_A_ROW = {'sign': 'gain', 'theta': 'offset'}  # what people write, and what is meant
+_IN_A_VERSION = {
+    'virtual_link': 'a last row such as {a: 0, d: 6.6, alpha: 90, type: fixed}'
+}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -90,7 +89,7 @@ class _FileReader:
 
     def __init__(self) -> None:
         self.warnings: list[str] = []
-        self._length = self._angle = ''
+        self._length = self._angle = self._default = ''
         self._rows_read = 0
 
     def chains(self, path: str | Path) -> tuple[str, dict[str, ChainEntry]]:
@@ -99,23 +98,25 @@ class _FileReader:
         units = top['units'].record(('length', 'angle'))
         self._length = units['length'].choice(_LENGTHS)
         self._angle = units['angle'].choice(_ANGLES)
+        self._default = top.given('default_version', '', Field.name, 'a version')
         chains = top['chains'].mapping('chains by name', lambda name: f'chain {name}')
         if not chains:
             top['chains'].fail('at least one chain', 'none')
-        entries = {name: self._entry(name, at, top) for name, at in chains.items()}
+        entries = {name: self._entry(name, at) for name, at in chains.items()}
         self._check_tips(entries, chains)
-        self._check_default(top, entries)
+        versions = {version for entry in entries.values() for version in entry.versions}
+        if self._default and self._default not in versions:
+            known = ', '.join(sorted(versions))
+            top['default_version'].fail(f'a version of the file: {known}')
         return root.file, entries
 
-    def _entry(self, name: str, at: Field, top: Mapping[str, Field]) -> ChainEntry:
+    def _entry(self, name: str, at: Field) -> ChainEntry:
         fields = at.record(
             ('tip', *_PLACE, 'versions'), ('root_axes', 'default_version')
         )
         tip = fields['tip'].name('a name', WORD)
         versions = self._versions(name, tip, fields)
-        return ChainEntry(
-            name, tip, versions, self._default_version(versions, fields, top)
-        )
+        return ChainEntry(name, tip, versions, self._default_version(versions, fields))
 
     def _check_tips(
         self, entries: Mapping[str, ChainEntry], chains: Mapping[str, Field]
@@ -130,36 +131,14 @@ class _FileReader:
                     f'{entry.tip}, the tip of chain {owner}',
                 )
 
-    def _check_default(
-        self, top: Mapping[str, Field], entries: Mapping[str, ChainEntry]
-    ) -> None:
-        """Refuse a default version that no chain has."""
-        if 'default_version' not in top:
-            return
-        default = top['default_version'].name('a version')
-        known = dict.fromkeys(
-            version for entry in entries.values() for version in entry.versions
-        )
-        if default not in known:
-            top['default_version'].fail(f'a version of the file: {", ".join(known)}')
-
-    def _default_version(
-        self,
-        versions: Mapping[str, Chain],
-        chain: Mapping[str, Field],
-        top: Mapping[str, Field],
-    ) -> str:
+    def _default_version(self, versions: Mapping[str, Chain], chain: Record) -> str:
         """Return the chain's own default, or the file's, or the only version; else nothing."""
-        if 'default_version' in chain:
-            return chain['default_version'].choice(tuple(versions))
-        default = _given(top, 'default_version', lambda at: at.name('a version'), '')
-        if default in versions:
-            return default
+        own = chain.given('default_version', '', Field.choice, tuple(versions))
+        if own or self._default in versions:
+            return own or self._default
         return next(iter(versions)) if len(versions) == 1 else ''
 
-    def _versions(
-        self, name: str, tip: str, chain: Mapping[str, Field]
-    ) -> dict[str, Chain]:
+    def _versions(self, name: str, tip: str, chain: Record) -> dict[str, Chain]:
         versions = chain['versions'].mapping(
             'versions by name', lambda version: f'chain {name}, version {version}'
         )
@@ -171,23 +150,15 @@ class _FileReader:
         }
 
     def _version(
-        self, name: str, tip: str, version: str, at: Field, chain: Mapping[str, Field]
+        self, name: str, tip: str, version: str, at: Field, chain: Record
     ) -> Chain:
-        if at.has('virtual_link'):
-            at.fail(
-                'a last row of links instead, such as '
-                '{a: 0, d: 6.6, alpha: 90, offset: 0, type: fixed}',
-                'key virtual_link',
-            )
-        own = at.record(('links',), _VERSION)
-        place = {**chain, **own}
-        convention = _given(
-            own, 'convention', lambda at: at.choice(CONVENTIONS), 'standard'
-        )
+        own = at.record(('links',), _VERSION, _IN_A_VERSION)
+        place = Record({**chain, **own})
+        convention = own.given('convention', 'standard', Field.choice, CONVENTIONS)
         root_frame = place['root_frame'].name('a frame id', FRAME_ID)
         joint_names = self._joint_names(place['joints'])
-        links = self._links(Field(at.file, at.where, own['links'].node), joint_names)
-        T_root_0 = _given(own, 'T_Ro0', self._transform, np.eye(4))
+        links = self._links(at, own['links'], joint_names)
+        T_root_0 = own.given('T_Ro0', np.eye(4), self._transform)
         self._doubt_lengths(at, links, T_root_0)
         return Chain(
             name=name,
@@ -198,10 +169,10 @@ class _FileReader:
             links=standard_rows(links) if convention == 'modified' else tuple(links),
             T_root_0=T_root_0,
             tip_frames=self._tip_frames(place['tip_frames'], root_frame),
-            T_n_tip=_given(own, 'T_nIs', self._transform, np.eye(4)),
+            T_n_tip=own.given('T_nIs', np.eye(4), self._transform),
             convention=convention,
-            root_axes=_given(place, 'root_axes', self._root_axes, ()),
-            source=_given(own, 'source', Field.text, ''),
+            root_axes=place.given('root_axes', (), self._root_axes),
+            source=own.given('source', '', Field.text),
         )
 
     def _joint_names(self, at: Field) -> tuple[str, ...]:
@@ -237,8 +208,8 @@ class _FileReader:
                 fields['frame'].fail('another frame id than the root frame')
             frames[name] = TipFrame(
                 frame_id,
-                _given(fields, 'transform', self._transform, np.eye(4)),
-                _given(fields, 'outline', self._outline, None),
+                fields.given('transform', np.eye(4), self._transform),
+                fields.given('outline', None, self._outline),
             )
         if not frames:
             at.fail('at least one tip frame', 'none')
@@ -254,21 +225,22 @@ class _FileReader:
             at.fail('at least three corners', f'{len(corners)}')
         return np.array(corners)
 
-    def _links(self, at: Field, joint_names: Sequence[str]) -> list[DHLink]:
+    def _links(
+        self, version: Field, at: Field, joint_names: Sequence[str]
+    ) -> list[DHLink]:
         links = []
         has_range: set[str] = set()
-        rows = at.at('field links').items('a list of rows')
-        for index, item in enumerate(rows):
-            row = Field(at.file, f'{at.where}, row {index}', item.node)
+        for index, item in enumerate(at.items('a list of rows')):
             self._rows_read += 1
             if self._rows_read > _MOST_ROWS:
                 at.fail(f'at most {_MOST_ROWS} in a file', 'too many rows')
+            row = Field(at.file, f'{version.where}, row {index}', item.node)
             links.append(self._link(row, joint_names, has_range))
         named = {link.joint for link in links if link.joint}
         unnamed_rows = sum(not link.is_fixed and not link.joint for link in links)
         unnamed_joints = sum(name not in named for name in joint_names)
         if unnamed_rows != unnamed_joints:
-            at.at('field links').fail(
+            at.fail(
                 f'{unnamed_joints}, one per joint that no row names',
                 f'{unnamed_rows} row{"s" * (unnamed_rows != 1)} with a joint',
             )
@@ -277,52 +249,33 @@ class _FileReader:
     def _link(
         self, row: Field, joint_names: Sequence[str], has_range: set[str]
     ) -> DHLink:
-        for other, name in _OTHER_NAMES.items():
-            if row.has(other):
-                row.fail(f'{name} instead', f'key {other}')
-        fields = row.record(('a', 'd', 'alpha'), _ROW)
-        joint_type = _given(
-            fields, 'type', lambda at: at.choice(JOINT_TYPES), 'revolute'
-        )
+        fields = row.record(('a', 'd', 'alpha'), _ROW, _IN_A_ROW)
+        joint_type = fields.given('type', 'revolute', Field.choice, JOINT_TYPES)
+        joint = fields.given('joint', '', Field.choice, tuple(joint_names))
         for name in _OF_A_JOINT:
-            if joint_type == 'fixed' and name in fields:
+            if name in fields and joint_type == 'fixed':
                 fields[name].fail('nothing, since a fixed row has no joint')
-        joint = _given(fields, 'joint', lambda at: at.choice(tuple(joint_names)), '')
-        self._check_follower(fields, joint, has_range)
+            if name in fields and name.endswith('range') and joint in has_range:
+                fields[name].fail(
+                    f'nothing: the range of joint {joint} stands on the first row that it moves'
+                )
+        if joint:
+            has_range.add(joint)
         slides = joint_type == 'prismatic'
-        lower, upper = _given(
-            fields, 'range', lambda at: self._range(at, slides), _NO_RANGE
-        )
+        lower, upper = fields.given('range', _NO_RANGE, self._range, slides)
         return DHLink(
             a=self._metres(fields['a']),
             d=self._metres(fields['d']),
             alpha=self._row_angle(fields['alpha']),
-            offset=_given(fields, 'offset', self._row_angle, 0.0),
+            offset=fields.given('offset', 0.0, self._row_angle),
             joint_type=joint_type,
-            gain=_given(fields, 'gain', self._gain, 1.0),
+            gain=fields.given('gain', 1.0, self._gain),
             joint=joint,
             lower=lower,
             upper=upper,
-            robot_range=_given(
-                fields, 'robot_range', lambda at: self._range(at, slides), None
-            ),
-            erratum=_given(fields, 'erratum', Field.text, ''),
+            robot_range=fields.given('robot_range', None, self._range, slides),
+            erratum=fields.given('erratum', '', Field.text),
         )
-
-    def _check_follower(
-        self, fields: Mapping[str, Field], joint: str, seen: set[str]
-    ) -> None:
-        """Refuse a range on another row than the first that its joint moves."""
-        if not joint:
-            return
-        if joint in seen:
-            for name in ('range', 'robot_range'):
-                if name in fields:
-                    fields[name].fail(
-                        f'nothing: the range of joint {joint} stands on the first '
-                        'row that it moves'
-                    )
-        seen.add(joint)
 
     def _gain(self, at: Field) -> float:
         gain = at.number()
@@ -436,13 +389,3 @@ def _is_rounded_fraction_of_pi(text: str) -> bool:
     if not 2 <= decimals <= 8 or not 0 < abs(times) * part < 6.3:
         return False
     return round(times * part, decimals) == float(text)
-
-
-def _given(
-    fields: Mapping[str, Field],
-    name: str,
-    read: Callable[[Field], _Value],
-    default: _Default,
-) -> _Value | _Default:
-    """Return what an optional field holds, or a default."""
-    return read(fields[name]) if name in fields else default

@@ -11,20 +11,19 @@ between them, so the table is exact and no number is large. For people it is tid
 are rounded, and what is almost parallel or almost a right angle was meant to be.
 """
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 import math
 from pathlib import Path
 import re
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from icub_leg_fk.errors import InputFileError
 from icub_leg_fk.kinematics.chain import Chain, TipFrame
 from icub_leg_fk.kinematics.link import DHLink
 from icub_leg_fk.kinematics.rotation import Array
-from icub_leg_fk.kinematics.urdf_file import Urdf
+from icub_leg_fk.kinematics.urdf_file import Urdf, UrdfJoint
 import numpy as np
 
 VERSION = 'urdf'
@@ -62,8 +61,8 @@ def chain_from_urdf(
         version=VERSION,
         root_frame=root,
         tip=name,
-        joint_names=tuple(dict.fromkeys(axis.joint for axis in axes)),
-        links=tuple(_with_joints(links, axes)),
+        joint_names=tuple(dict.fromkeys(axis.joint.moved_by for axis in axes)),
+        links=tuple(links),
         T_root_0=_rounded(frames[0]),
         tip_frames={name: TipFrame(tip)},
         T_n_tip=_rounded(np.linalg.inv(frames[-1]) @ T_end),
@@ -103,20 +102,16 @@ def almost_parallel(
     for one, two in pairwise(axes):
         angle = float(np.linalg.norm(np.cross(one.direction, two.direction)))
         if _EXACT < angle <= tolerance:
-            pairs.append((one.joint, two.joint, angle))
+            pairs.append((one.joint.moved_by, two.joint.moved_by, angle))
     return pairs
 
 
 class _Axis(NamedTuple):
-    """Where a joint's axis is at q = 0, in the root link, and what moves it."""
+    """Where a joint's axis is at q = 0, in the root link."""
 
-    kind: str
+    joint: UrdfJoint
     direction: Array
     point: Array
-    joint: str
-    gain: float
-    lower: float
-    upper: float
 
 
 def _axes(urdf: Urdf, root: str, tip: str) -> tuple[list[_Axis], Array]:
@@ -125,39 +120,25 @@ def _axes(urdf: Urdf, root: str, tip: str) -> tuple[list[_Axis], Array]:
     for joint in urdf.path(root, tip):
         T = T @ joint.origin
         if joint.moves:
-            axes.append(
-                _Axis(
-                    joint.kind,
-                    T[:3, :3] @ joint.axis,
-                    T[:3, 3].copy(),
-                    joint.moved_by,
-                    joint.gain,
-                    joint.lower,
-                    joint.upper,
-                )
-            )
+            axes.append(_Axis(joint, T[:3, :3] @ joint.axis, T[:3, 3].copy()))
             T = T @ joint.motion(np.array([joint.offset]))[0]
     if not axes:
         raise InputFileError(urdf.file, f'no joint moves between {root!r} and {tip!r}')
     return axes, T
 
 
-def _with_joints(links: Sequence[DHLink], axes: Sequence[_Axis]) -> list[DHLink]:
-    """Return rows moved by their joints: by name if a joint moves several."""
-    rows_of = Counter(axis.joint for axis in axes)
-    remaining = iter(axes)
-    ranged: set[str] = set()
-    rows = []
-    for link in links:
-        if not link.is_fixed:
-            axis = next(remaining)
-            joint = axis.joint if rows_of[axis.joint] > 1 else ''
-            link = replace(link, gain=axis.gain, joint=joint)
-            if axis.joint not in ranged:  # a range stands on the first row of its joint
-                link = replace(link, lower=axis.lower, upper=axis.upper)
-            ranged.add(axis.joint)
-        rows.append(link)
-    return rows
+def _motions(axes: Sequence[_Axis]) -> list[dict[str, Any]]:
+    """Return what moves the row of each axis: a joint by its name if it moves several rows."""
+    names = [axis.joint.moved_by for axis in axes]
+    motions: list[dict[str, Any]] = []
+    for index, (joint, _, _) in enumerate(axes):
+        motion: dict[str, Any] = {'joint_type': joint.kind, 'gain': joint.gain}
+        if names.count(joint.moved_by) > 1:
+            motion['joint'] = joint.moved_by
+        if joint.moved_by not in names[:index]:  # the first row has the range
+            motion.update(lower=joint.lower, upper=joint.upper)
+        motions.append(motion)
+    return motions
 
 
 def _frames_and_rows(
@@ -166,17 +147,18 @@ def _frames_and_rows(
     """Place the frames one after the other and read the rows off them (steps 2 to 5)."""
     frames = [_first_frame(axes)]
     links: list[DHLink] = []
-    for axis, following in zip(axes, [*axes[1:], None], strict=True):
+    for axis, following, motion in zip(
+        axes, [*axes[1:], None], _motions(axes), strict=True
+    ):
         if following is None:
             placed = [_last_frame(frames[-1], T_end, tolerance)]
         else:
             placed = _frames_on(frames[-1], axis, following, tolerance)
         for frame in placed:
-            kind = axis.kind if frame is placed[0] else 'fixed'
-            link = _row(frames[-1], frame, kind, tolerance)
-            links.append(link)
+            link = _fixed_row(frames[-1], frame, tolerance)
             # After the row as it was read, so that what rounding it has cost does not add up.
             frames.append(frames[-1] @ link.transform())
+            links.append(replace(link, **motion) if frame is placed[0] else link)
     return frames, links
 
 
@@ -186,7 +168,7 @@ def _frames_on(
     """Return the frame on the next joint's axis, after one across if that axis is awkward."""
     # Of a slide only the direction counts; its line may pass where the frame before it is.
     start, z = frame[:3, 3], following.direction
-    point = start if following.kind == 'prismatic' else following.point
+    point = start if following.joint.kind == 'prismatic' else following.point
     reach = _FAR + 5 * float(np.linalg.norm(following.point - axis.point))
     if not _is_far(frame, z, point, tolerance, reach):
         return [_next_frame(frame, z, point, tolerance)]
@@ -213,16 +195,33 @@ def _last_frame(frame: Array, T_end: Array, tolerance: float) -> Array:
 def _first_frame(axes: Sequence[_Axis]) -> Array:
     """Return frame 0: on the first axis, where d_1 = 0 if near, its x along a root axis."""
     z, origin = axes[0].direction, axes[0].point
-    if len(axes) > 1 and axes[1].kind == axes[0].kind == 'revolute':
-        normal = np.cross(z, axes[1].direction)
-        sine_squared = float(normal @ normal)
-        if sine_squared > _NEARLY**2:
-            moment = np.cross(axes[1].point - origin, axes[1].direction)
-            along = float(moment @ normal) / sine_squared
-            if abs(along) < _FAR:
-                origin = origin + along * z
+    if len(axes) > 1 and axes[1].joint.kind == axes[0].joint.kind == 'revolute':
+        _, sine, along, _ = _common_normal(origin, z, axes[1].point, axes[1].direction)
+        if sine > _NEARLY and abs(along) < _FAR:
+            origin = origin + along * z
     x = np.eye(3)[int(np.argmin(np.abs(z).round(9)))]
     return _frame(x - z * (x @ z), z, origin)
+
+
+def _common_normal(
+    point: Array, z: Array, next_point: Array, next_z: Array
+) -> tuple[Array, float, float, float]:
+    """Return the common normal of two lines.
+
+    Returns:
+        Its (3,) unit vector, 0 if the lines are parallel; the sine of the angle between them; how
+        far it is from the point of the first line, and from that of the second, along them.
+    """
+    normal = np.cross(z, next_z)
+    sine = float(np.linalg.norm(normal))
+    if sine == 0.0:
+        return normal, sine, 0.0, 0.0
+    normal /= sine
+    along, along_next = (
+        float(np.cross(next_point - point, other) @ normal) / sine
+        for other in (next_z, z)
+    )
+    return normal, sine, along, along_next
 
 
 def _foot(start: Array, point: Array, z: Array) -> Array:
@@ -234,61 +233,47 @@ def _is_far(
     frame: Array, z: Array, point: Array, tolerance: float, reach: float
 ) -> bool:
     """Return whether the common normal of almost parallel axes is farther away than a reach."""
-    z0, start = frame[:3, 2], frame[:3, 3]
-    normal = np.cross(z0, z)
-    sine = float(np.linalg.norm(normal))
+    start = frame[:3, 3]
+    _, sine, *along = _common_normal(start, frame[:3, 2], point, z)
     if not tolerance < sine < _NEARLY:
         return False
-    along = float(np.cross(point - start, z) @ normal) / sine**2
-    along_next = float(np.cross(point - start, z0) @ normal) / sine**2
     is_apart = float(np.linalg.norm(_foot(start, point, z) - start)) > _EXACT
-    return is_apart and max(abs(along), abs(along_next)) > reach
+    return is_apart and max(map(abs, along)) > reach
 
 
 def _next_frame(frame: Array, z: Array, point: Array, tolerance: float) -> Array:
     """Return the frame on the next axis, its x along the common normal (steps 2 to 4)."""
     x0, z0, start = frame[:3, 0], frame[:3, 2], frame[:3, 3]
-    normal = np.cross(z0, z)
-    sine = float(np.linalg.norm(normal))
+    x, sine, _, along = _common_normal(start, z0, point, z)
     if sine <= max(tolerance, _EXACT):  # parallel: d = 0
         z = z0 if z0 @ z > 0 else -z0
         origin = _foot(start, point, z)
-        x = origin - start
-        if np.linalg.norm(x) < _EXACT:  # and the same: theta = 0
+        if np.linalg.norm(origin - start) < _EXACT:  # and the same: theta = 0
             return _frame(x0, z, start)
-        return _frame(x, z, origin)
-    normal /= sine
-    along = (
-        float(np.cross(point - start, z0) @ normal) / sine
-    )  # from the point to the normal
+        return _frame(origin - start, z, origin)
     origin = point + along * z
-    a = float((origin - start) @ normal)
+    a = float((origin - start) @ x)
     if abs(a) < _EXACT:  # they cross: the x nearer to the one before
-        cosine = float(x0 @ normal)
-        points_away = abs(cosine) <= _EXACT and float(np.cross(x0, normal) @ z0) < 0
-        return _frame(-normal if cosine < -_EXACT or points_away else normal, z, origin)
-    return _frame(-normal if a < 0 else normal, z, origin)
+        cosine = float(x0 @ x)
+        points_away = abs(cosine) <= _EXACT and float(np.cross(x0, x) @ z0) < 0
+        is_other = cosine < -_EXACT or points_away
+    else:
+        is_other = a < 0
+    return _frame(-x if is_other else x, z, origin)
 
 
-def _row(before: Array, after: Array, kind: str, tolerance: float) -> DHLink:
+def _fixed_row(before: Array, after: Array, tolerance: float) -> DHLink:
     """Read theta, d, a and alpha off two frames (step 5), tidied if there is a tolerance."""
     T = np.linalg.inv(before) @ after
     theta = math.atan2(T[1, 0], T[0, 0])
     a = math.cos(theta) * T[0, 3] + math.sin(theta) * T[1, 3]
     alpha = math.atan2(T[2, 1], T[2, 2])
     shortest = _SHORT if tolerance else _EXACT
-    apart = max(tolerance, _EXACT)
-    return DHLink(
-        a=_clean_length(a, shortest),
-        d=_clean_length(T[2, 3], shortest),
-        alpha=_clean_angle(alpha, apart),
-        offset=_clean_angle(theta, apart),
-        joint_type=kind,
+    a, d = (0.0 if abs(length) < shortest else length for length in (a, T[2, 3]))
+    alpha, offset = (
+        _clean_angle(angle, max(tolerance, _EXACT)) for angle in (alpha, theta)
     )
-
-
-def _clean_length(length: float, shortest: float) -> float:
-    return 0.0 if abs(length) < shortest else float(length)
+    return DHLink(a, d, alpha, offset, 'fixed')
 
 
 def _clean_angle(angle: float, apart: float) -> float:
@@ -296,7 +281,7 @@ def _clean_angle(angle: float, apart: float) -> float:
     quarters = round(angle / (math.pi / 2))
     if abs(angle - quarters * math.pi / 2) <= apart:
         angle = quarters * math.pi / 2
-    return math.pi if angle == -math.pi else float(angle)
+    return math.pi if angle == -math.pi else angle
 
 
 def _rounded(T: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -150,16 +151,14 @@ class Urdf:
                 links.append(element.get('name', ''))
             elif tag(element) == 'joint':
                 joints.append(_joint_element(element))
-        for kind, names in (
-            ('link', links),
-            ('joint', [joint.name for joint in joints]),
-        ):
-            again = _first_again(names)
-            if again is not None:
-                raise InputFileError(
-                    file,
-                    f'has two {kind}s of the name {again!r}; allowed: each {kind} once',
-                )
+        names = {'link': links, 'joint': [joint.name for joint in joints]}
+        for kind, names_of_kind in names.items():
+            for name, count in Counter(names_of_kind).items():
+                if count > 1:
+                    raise InputFileError(
+                        file,
+                        f'has two {kind}s of the name {name!r}; allowed: each {kind} once',
+                    )
         return cls(file, robot.get('name', ''), tuple(links), tuple(joints))
 
     def root(self) -> str:
@@ -196,12 +195,8 @@ class Urdf:
         if link in self._links:
             return
         ends = self.ends()[:_MOST_ENDS]
-        guess = closest(link, self.links)
-        if guess is None:
-            guess = next(
-                (name for name in self.links if link.casefold() in name.casefold()),
-                None,
-            )
+        within = [name for name in self.links if link.casefold() in name.casefold()]
+        guess = closest(link, self.links) or next(iter(within), '')
         advice = f'did you mean {guess!r}?' if guess and guess not in ends else ''
         raise UnknownNameError('link', link, ends, advice, of=self.file)
 
@@ -226,8 +221,7 @@ class Urdf:
                 f'link {tip!r} is not below {root!r}; above it is {passed[-1]!r}'
             )
         path = []
-        for element in up:
-            joint = self._checked(element)
+        for joint in map(self._checked, up):
             if joint.kind != 'fixed':
                 self._fail(
                     f'link {tip!r} is not below {root!r}, and joint {joint.name!r} above '
@@ -235,8 +229,7 @@ class Urdf:
                 )
             origin = np.asarray(np.linalg.inv(joint.origin))
             path.append(joint._replace(origin=origin))
-        for element in reversed(down[: passed.index(turn)]):
-            path.append(self._checked(element))
+        path += map(self._checked, reversed(down[: passed.index(turn)]))
         return tuple(path)
 
     def forward(self, root: str, tip: str, positions: Mapping[str, Array]) -> Array:
@@ -393,10 +386,7 @@ class Urdf:
         joint = self._joints_by_name.get(name)
         if joint is None or joint.kind not in ('revolute', 'prismatic'):
             return -math.inf, math.inf
-        if ('limit', 'lower') not in joint.texts and (
-            'limit',
-            'upper',
-        ) not in joint.texts:
+        if not {('limit', 'lower'), ('limit', 'upper')} & {*joint.texts}:
             return -math.inf, math.inf
         (lower,) = self._numbers(joint, 'limit', 'lower', '0')
         (upper,) = self._numbers(joint, 'limit', 'upper', '0')
@@ -451,12 +441,3 @@ def _joint_element(element: etree._Element) -> JointElement:
         texts.get(('child', 'link'), ''),
         texts,
     )
-
-
-def _first_again(names: list[str]) -> str | None:
-    seen = set()
-    for name in names:
-        if name in seen:
-            return name
-        seen.add(name)
-    return None

@@ -8,19 +8,23 @@ that it names.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 import math
 from pathlib import Path
 import re
 import reprlib
-from typing import Any, NoReturn
+from types import MappingProxyType
+from typing import Any, NoReturn, TypeVar
 
 from icub_leg_fk.errors import CatalogError, closest
 from icub_leg_fk.kinematics.input_bytes import first_bytes, shown
 import yaml
 
 MAX_BYTES = 1_000_000
+
+_Value = TypeVar('_Value')
+_Default = TypeVar('_Default')
 
 # libyaml, where PyYAML was built with it, is thirty times as fast as the loader in Python.
 Loader: Any = getattr(yaml, 'CBaseLoader', yaml.BaseLoader)
@@ -86,12 +90,6 @@ class Field:
         """Return the same node, with its place described more closely."""
         return Field(self.file, f'{self.where}, {place}', self.node)
 
-    def has(self, key: str) -> bool:
-        """Return whether this is a mapping with a key of that name."""
-        if not isinstance(self.node, yaml.MappingNode):
-            return False
-        return any(name.value == key for name, _ in self.node.value)
-
     def mapping(
         self, content: str, where: Callable[[str], str], kind: TextKind = NAME
     ) -> dict[str, Field]:
@@ -115,27 +113,37 @@ class Field:
         return fields
 
     def record(
-        self, required: tuple[str, ...], optional: tuple[str, ...] = ()
-    ) -> dict[str, Field]:
-        """Return the fields of a mapping whose keys are fixed."""
+        self,
+        required: tuple[str, ...],
+        optional: tuple[str, ...] = (),
+        instead: Mapping[str, str] = MappingProxyType({}),
+    ) -> Record:
+        """Return the fields of a mapping whose keys are fixed.
+
+        Args:
+            required: the keys that must be there.
+            optional: those that may be there.
+            instead: what is written today by keys that people write, too.
+        """
         known = required + optional
         fields = self.mapping(
             f'a mapping with {", ".join(known)}',
             lambda key: f'{self.where}, field {key}',
         )
         for key, _ in self.node.value:
-            if key.value not in known:
-                guess = closest(key.value, known)
+            at, word = Field(self.file, self.where, key), key.value
+            if word in instead:
+                at.fail(f'{instead[word]} instead', f'key {word}')
+            if word not in known:
+                guess = closest(word, known)
                 hint = f' (did you mean {guess!r}?)' if guess else ''
-                Field(self.file, self.where, key).fail(
-                    ', '.join(known), f'unknown key {_short.repr(key.value)}{hint}'
-                )
+                at.fail(', '.join(known), f'unknown key {_short.repr(word)}{hint}')
         for name in required:
             if name not in fields:
                 self.at(f'field {name}').fail(
                     f'all of {", ".join(required)}', 'nothing'
                 )
-        return fields
+        return Record(fields)
 
     def items(self, content: str, length: int | None = None) -> Iterator[Field]:
         """Yield the items of a list, which has at least one, or exactly `length`."""
@@ -196,6 +204,23 @@ class Field:
         ):
             return str(self.node.value)
         return None
+
+
+class Record(dict[str, Field]):
+    """The fields of a mapping whose keys are fixed."""
+
+    def given(
+        self, name: str, default: _Default, read: Callable[..., _Value], *details: Any
+    ) -> _Value | _Default:
+        """Return what an optional field holds, or a default.
+
+        Args:
+            name: of the field.
+            default: what counts if it is not there.
+            read: returns what a field holds, such as `Field.number`.
+            details: what else `read` takes.
+        """
+        return read(self[name], *details) if name in self else default
 
 
 def read_yaml(path: str | Path) -> Field:

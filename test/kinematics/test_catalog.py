@@ -253,14 +253,6 @@ def test_chains_that_cannot_be_used_together_are_refused(
     assert words in str(error.value)
 
 
-def test_frames_are_named_as_in_the_robots_urdfs() -> None:
-    for name, side in (('left_leg', 'l'), ('right_leg', 'r')):
-        dh, sole = CATALOG.chain(name, 'v2_5'), CATALOG.chain(name, 'v2_5', 'sole')
-        assert (dh.root_frame, dh.frame_id) == ('root_link', f'{side}_foot_dh_frame')
-        assert (sole.root_frame, sole.frame_id) == ('root_link', f'{side}_sole')
-    assert CATALOG.chain('head_imu', 'v2').frame_id == 'imu_frame'
-
-
 OWN = """
 units: {length: m, angle: rad}
 chains:

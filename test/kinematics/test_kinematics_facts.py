@@ -1,9 +1,7 @@
 """What is known of the documented chains without computing: zeros, mirrors, axes, frames."""
 
-from dataclasses import replace
-
 from icub_leg_fk.errors import LegFKError
-from icub_leg_fk.kinematics import Catalog, DHLink
+from icub_leg_fk.kinematics import Catalog
 import numpy as np
 import pytest
 from support.described_robots import needs_real_robots, pinocchio_pose, REAL
@@ -79,26 +77,6 @@ def test_sole_points_forward_left_and_up_when_standing(name: str) -> None:
         assert np.array_equal(
             T[:3, :3].T, [[forward, 0, 0], [0, forward, 0], [0, 0, 1]]
         )
-
-
-def test_sensor_transform_equals_the_fixed_row() -> None:
-    head = CATALOG.chain('head_imu', 'v2')
-    last = DHLink(a=0, d=0.0066, alpha=np.pi / 2, joint_type='fixed')
-    virtual = replace(head, links=(*head.links, last), T_n_tip=np.eye(4))
-    assert not np.array_equal(head.T_n_tip, np.eye(4))
-    for q in np.random.default_rng(6).uniform(-3, 3, (100, 6)):
-        assert np.array_equal(virtual.forward(q), head.forward(q))
-        assert virtual.pose(q) == pytest.approx(head.pose(q), abs=1e-15)
-
-
-def test_frames_begin_at_frame_0_and_end_at_the_tip() -> None:
-    chain = CATALOG.chain('head_imu', 'v2')
-    q = [0.1, -0.2, 0.3, -0.4, 0.5, -0.6]
-    frames = chain.frames(q)
-    assert frames.shape == (8, 4, 4)
-    assert np.array_equal(frames[0], chain.T_root_0)
-    assert np.array_equal(frames[-1], chain.forward(q))
-    assert frames[-1] == pytest.approx(frames[-2] @ chain.T_n_tip, abs=1e-16)
 
 
 def test_out_of_range_names_the_joints_and_clamps_nothing() -> None:

@@ -1,4 +1,4 @@
-"""The quaternion does not flip: on a recorded walk, a standing robot, any path near q = 0."""
+"""The quaternion does not flip: on a recorded walk, on any path near q = 0."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -18,9 +18,6 @@ CHAINS = [
     for version, table in entry.versions.items()
     for frame in table.tip_frames
 ]
-every_chain = pytest.mark.parametrize(
-    'chain', CHAINS, ids=lambda c: f'{c.frame_id} {c.version}'
-)
 
 
 def flips(chain: Chain, Q: np.ndarray) -> int:
@@ -48,12 +45,6 @@ def test_no_flip_on_the_recorded_walk(frame: str) -> None:
 @pytest.mark.parametrize('frame', ['dh', 'sole'])
 def test_no_flip_on_the_synthetic_walk(frame: str) -> None:
     check_walk(*read_synthetic_walk(), frame)
-
-
-@every_chain
-def test_no_flip_of_a_standing_robot(chain: Chain) -> None:
-    noise = np.random.default_rng(30).normal(0, np.radians(0.01), (2_000, chain.n))
-    assert flips(chain, noise) == 0
 
 
 @given(st.sampled_from(CHAINS), st.data())

@@ -5,130 +5,116 @@ translations about the axes; nothing here is shared with the code under test.
 """
 
 from collections.abc import Sequence
-from math import cos, pi, sin
+from math import cos, sin
 from typing import Any
 
 from icub_leg_fk.kinematics import Chain
 import numpy as np
 
-# (a [mm], d [mm], alpha [rad], offset [deg]), a row per link, as printed.
-Row = tuple[float, float, float, float]
-
-LEFT_V1: list[Row] = [
-    (0, 0, -pi / 2, 90),
-    (0, 0, -pi / 2, 90),
-    (0, -223.6, pi / 2, -90),
-    (-213, 0, pi, 90),
-    (0, 0, -pi / 2, 0),
-    (-41, 0, 0, 0),
-]
-RIGHT_V1: list[Row] = [
-    (0, 0, pi / 2, 90),
-    (0, 0, pi / 2, 90),
-    (0, 223.6, -pi / 2, -90),
-    (-213, 0, pi, 90),
-    (0, 0, pi / 2, 0),
-    (-41, 0, pi, 0),
-]
-LEFT_V2_5: list[Row] = [
-    (0, 0, -pi / 2, 90),
-    (0, 0, -pi / 2, 90),
-    (-0.9175, -234.545, pi / 2, -90),
-    (-200.5, 0, pi, 90),
-    (0, 0, -pi / 2, 0),
-    (-68.05, -3.5, 0, 0),
-]
-RIGHT_V2_5: list[Row] = [
-    (0, 0, pi / 2, 90),
-    (0, 0, pi / 2, 90),
-    (-0.9175, 234.545, -pi / 2, -90),
-    (-200.5, 0, pi, 90),
-    (0, 0, pi / 2, 0),
-    (-68.05, 3.5, pi, 0),
-]
-# Of iKin, not of the documents; the left knee's d is the robot's, which iKin prints as +6.2.
-LEFT_V3: list[Row] = [
-    (9, 0, -pi / 2, 90),
-    (-15, -10.6, -pi / 2, 90),
-    (15, -266.8, pi / 2, -90),
-    (-255.988, -6.2, pi, 90),
-    (-35, 0, -pi / 2, 0),
-    (-53.2, 0, 0, 0),
-]
-RIGHT_V3: list[Row] = [
-    (9, 0, pi / 2, 90),
-    (-15, 10.6, pi / 2, 90),
-    (15, 266.8, -pi / 2, -90),
-    (-255.988, 6.2, pi, 90),
-    (-35, 0, pi / 2, 0),
-    (-53.2, 0, pi, 0),
-]
-HEAD_V2: list[Row] = [
-    (32, 0, pi / 2, 0),
-    (0, -5.5, pi / 2, -90),
-    (0, -223.3, -pi / 2, -90),
-    (9.5, 0, pi / 2, 90),
-    (0, 0, -pi / 2, -90),
-    (18.5, 110.8, -pi / 2, 90),
-]
-
-# Of the URDF of iCubGenova09, read off by the documented method; not in print.
-HEAD_V3: list[Row] = [
-    (72.5, 0, -pi / 2, -90),
-    (0, 0, -pi / 2, 90),
-    (4.86151, -278.7695, -pi / 2, 0),
-    (9.5005, 0, pi / 2, 90),
-    (0, 0, pi / 2, 90),
-    (-5.5, 170.484, pi, 0),
-]
-
-
-def _leg_root(x: float, y: float, z: float) -> np.ndarray:
-    return np.array(
-        [[1, 0, 0, x / 1000], [0, 0, 1, y / 1000], [0, -1, 0, z / 1000], [0, 0, 0, 1]]
-    )
-
-
-HEAD_ROOT = np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
-HEAD_V3_ROOT = np.array(
-    [[0.0, 0, -1, 0], [1, 0, 0, 0], [0, -1, 0, 0.0605], [0, 0, 0, 1]]
-)
-T_NIS_V3 = np.array([[1.0, 0, 0, 0], [0, 1, 0, -0.0035], [0, 0, 1, 0], [0, 0, 0, 1]])
-T_NIS = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0.0066], [0, 0, 0, 1]])
-V3_ROOT = {
-    side: np.array([[-1, 0, 0, 0.0216], [0, 0, -1, y], [0, -1, 0, 0], [0, 0, 0, 1]])
-    for side, y in (('left', 0.07365), ('right', -0.07365))
+# Chain, version, a [mm], d [mm], alpha [deg], offset [deg], as printed; a line per row. Version 3
+# of the legs is iKin's, with the left knee's d as the robot has it, which iKin prints as +6.2;
+# that of the head is read off the URDF of iCubGenova09 by the documented method.
+PRINTED = """
+left_leg   v1      0        0        -90   90
+left_leg   v1      0        0        -90   90
+left_leg   v1      0        -223.6    90  -90
+left_leg   v1     -213      0        180   90
+left_leg   v1      0        0        -90    0
+left_leg   v1     -41       0          0    0
+right_leg  v1      0        0         90   90
+right_leg  v1      0        0         90   90
+right_leg  v1      0        223.6    -90  -90
+right_leg  v1     -213      0        180   90
+right_leg  v1      0        0         90    0
+right_leg  v1     -41       0        180    0
+left_leg   v2_5    0        0        -90   90
+left_leg   v2_5    0        0        -90   90
+left_leg   v2_5   -0.9175   -234.545  90  -90
+left_leg   v2_5   -200.5    0        180   90
+left_leg   v2_5    0        0        -90    0
+left_leg   v2_5   -68.05    -3.5       0    0
+right_leg  v2_5    0        0         90   90
+right_leg  v2_5    0        0         90   90
+right_leg  v2_5   -0.9175   234.545  -90  -90
+right_leg  v2_5   -200.5    0        180   90
+right_leg  v2_5    0        0         90    0
+right_leg  v2_5   -68.05    3.5      180    0
+left_leg   v3      9        0        -90   90
+left_leg   v3     -15       -10.6    -90   90
+left_leg   v3      15       -266.8    90  -90
+left_leg   v3     -255.988  -6.2     180   90
+left_leg   v3     -35       0        -90    0
+left_leg   v3     -53.2     0          0    0
+right_leg  v3      9        0         90   90
+right_leg  v3     -15       10.6      90   90
+right_leg  v3      15       266.8    -90  -90
+right_leg  v3     -255.988  6.2      180   90
+right_leg  v3     -35       0         90    0
+right_leg  v3     -53.2     0        180    0
+head_imu   v2      32       0         90    0
+head_imu   v2      0        -5.5      90  -90
+head_imu   v2      0        -223.3   -90  -90
+head_imu   v2      9.5      0         90   90
+head_imu   v2      0        0        -90  -90
+head_imu   v2      18.5     110.8    -90   90
+head_imu   v3      72.5     0        -90  -90
+head_imu   v3      0        0        -90   90
+head_imu   v3      4.86151  -278.7695 -90   0
+head_imu   v3      9.5005   0         90   90
+head_imu   v3      0        0         90   90
+head_imu   v3     -5.5      170.484  180    0
+"""
+# The first three rows of each root transform, and of what follows the tables [mm].
+ROOTS = {
+    ('left_leg', 'v1'): '1 0 0 0  0 0 1 -68.1  0 -1 0 -119.9',
+    ('left_leg', 'v2_5'): '1 0 0 0  0 0 1 -68.1  0 -1 0 -119.9',
+    ('left_leg', 'v3'): '-1 0 0 21.6  0 0 -1 73.65  0 -1 0 0',
+    ('right_leg', 'v1'): '1 0 0 0  0 0 1 68.1  0 -1 0 -119.9',
+    ('right_leg', 'v2_5'): '1 0 0 0  0 0 1 68.1  0 -1 0 -119.9',
+    ('right_leg', 'v3'): '-1 0 0 21.6  0 0 -1 -73.65  0 -1 0 0',
+    ('head_imu', 'v2'): '0 -1 0 0  0 0 -1 0  1 0 0 0',
+    ('head_imu', 'v3'): '0 0 -1 0  1 0 0 0  0 -1 0 60.5',
 }
-SOLE = np.array([[0.0, 0, 1, 0], [0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
-
-# (chain, version): root transform, rows, transform from the tip to the last frame.
-TABLES: dict[tuple[str, str], tuple[np.ndarray, list[Row], np.ndarray]] = {
-    ('left_leg', 'v1'): (_leg_root(0, -68.1, -119.9), LEFT_V1, np.eye(4)),
-    ('left_leg', 'v2_5'): (_leg_root(0, -68.1, -119.9), LEFT_V2_5, np.eye(4)),
-    ('left_leg', 'v3'): (V3_ROOT['left'], LEFT_V3, np.eye(4)),
-    ('right_leg', 'v1'): (_leg_root(0, 68.1, -119.9), RIGHT_V1, np.eye(4)),
-    ('right_leg', 'v2_5'): (_leg_root(0, 68.1, -119.9), RIGHT_V2_5, np.eye(4)),
-    ('right_leg', 'v3'): (V3_ROOT['right'], RIGHT_V3, np.eye(4)),
-    ('head_imu', 'v2'): (HEAD_ROOT, HEAD_V2, T_NIS),
-    ('head_imu', 'v3'): (HEAD_V3_ROOT, HEAD_V3, T_NIS_V3),
+ENDS = {
+    ('head_imu', 'v2'): '1 0 0 0  0 0 -1 0  0 1 0 6.6',
+    ('head_imu', 'v3'): '1 0 0 0  0 1 0 -3.5  0 0 1 0',
 }
-V3_SOLE = SOLE @ np.array(
-    [[1, 0, 0, 0.02288], [0, 1, 0, 0], [0, 0, 1, -0.0126], [0, 0, 0, 1]]
-)
-
-
-def tip_transform(version: str, frame: str) -> np.ndarray:
-    """Return the transform from a tip frame to the end of the table."""
-    if frame != 'sole':
-        return np.eye(4)
-    return V3_SOLE if version == 'v3' else SOLE
-
+SOLE = '0 0 1 0  0 -1 0 0  1 0 0 0'
+SOLE_V3 = '0 0 1 -12.6  0 -1 0 0  1 0 0 22.88'
+IDENTITY = '1 0 0 0  0 1 0 0  0 0 1 0'
 
 CASES = [
     (name, version, frame)
-    for name, version in TABLES
+    for name, version in ROOTS
     for frame in (('dh', 'sole') if name != 'head_imu' else ('dh',))
 ]
+
+
+def table(name: str, version: str) -> list[list[float]]:
+    """Return a row of a, d [m], alpha, offset [rad] for each printed one."""
+    rows = []
+    for line in PRINTED.split('\n')[1:-1]:
+        words = line.split()
+        if words[:2] == [name, version]:
+            a, d, alpha, offset = map(float, words[2:])
+            rows.append([a / 1000, d / 1000, np.deg2rad(alpha), np.deg2rad(offset)])
+    return rows
+
+
+def transform(text: str) -> np.ndarray:
+    """Return the (4, 4) transform of three rows in mm."""
+    T = np.eye(4)
+    T[:3] = np.array(text.split(), float).reshape(3, 4)
+    T[:3, 3] /= 1000
+    return T
+
+
+def after_table(name: str, version: str, frame: str) -> np.ndarray:
+    """Return the transform from a tip frame to the last row's frame."""
+    T_n_tip = transform(ENDS.get((name, version), IDENTITY))
+    if frame != 'sole':
+        return T_n_tip
+    return T_n_tip @ transform(SOLE_V3 if version == 'v3' else SOLE)
 
 
 class PinocchioArm:
@@ -137,22 +123,15 @@ class PinocchioArm:
     def __init__(self, name: str, version: str, frame: str) -> None:
         import pinocchio as pin
 
-        T_root_0, rows, T_n_tip = TABLES[name, version]
         self.pin, self.model = pin, pin.Model()
-        placement, joint = pin.SE3(T_root_0), 0
-        for i, (a, d, alpha, offset) in enumerate(rows):
-            placement = placement * pin.SE3(
-                pin.utils.rotate('z', np.deg2rad(offset)), np.zeros(3)
-            )
+        T, joint = transform(ROOTS[name, version]), 0
+        for a, d, alpha, offset in table(name, version):
+            placement = pin.SE3(T @ rotation_z(offset))
             joint = self.model.addJoint(
-                joint, pin.JointModelRZ(), placement, f'joint_{i}'
+                joint, pin.JointModelRZ(), placement, f'j{joint}'
             )
-            along_z = pin.SE3(np.eye(3), np.array([0, 0, d / 1000]))
-            along_x = pin.SE3(np.eye(3), np.array([a / 1000, 0, 0]))
-            placement = (
-                along_z * along_x * pin.SE3(pin.utils.rotate('x', alpha), np.zeros(3))
-            )
-        placement = placement * pin.SE3(T_n_tip @ tip_transform(version, frame))
+            T = translation(a, 0, d) @ rotation_x(alpha)
+        placement = pin.SE3(T @ after_table(name, version, frame))
         self.tip = self.model.addFrame(
             pin.Frame('tip', joint, 0, placement, pin.FrameType.OP_FRAME)
         )
@@ -163,14 +142,9 @@ class PinocchioArm:
         return np.array(self.data.oMf[self.tip].homogeneous)
 
     def jacobian(self, q: np.ndarray) -> np.ndarray:
+        axes = self.pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         return np.array(
-            self.pin.computeFrameJacobian(
-                self.model,
-                self.data,
-                q,
-                self.tip,
-                self.pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
-            )
+            self.pin.computeFrameJacobian(self.model, self.data, q, self.tip, axes)
         )
 
 
@@ -202,32 +176,31 @@ class HandMadeArm:
     """A printed table multiplied out, where Pinocchio is not installed."""
 
     def __init__(self, name: str, version: str, frame: str) -> None:
-        self.T_root_0, self.rows, self.T_n_tip = TABLES[name, version]
-        self.T_dh_tip = tip_transform(version, frame)
+        self.T_root_0 = transform(ROOTS[name, version])
+        self.rows = table(name, version)
+        self.after = after_table(name, version, frame)
 
     def forward(self, q: np.ndarray) -> np.ndarray:
         T = self.T_root_0
         for (a, d, alpha, offset), position in zip(self.rows, q, strict=True):
-            T = T @ basic_product(
-                a / 1000, d / 1000, alpha, np.deg2rad(offset) + position
-            )
-        return T @ self.T_n_tip @ self.T_dh_tip
+            T = T @ basic_product(a, d, alpha, offset + position)
+        return T @ self.after
 
 
-def product(chain: Chain, q: Sequence[float]) -> np.ndarray:
-    """Return T_root_tip of any chain, each row as the product of its four basic transforms."""
+def frames(chain: Chain, q: Sequence[float]) -> list[np.ndarray]:
+    """Return every frame of any chain, each row as the product of its four basic transforms."""
     positions = dict(zip(chain.joint_names, q, strict=True))
     named = {link.joint for link in chain.links}
     others = iter([name for name in chain.joint_names if name not in named])
-    T = np.array(chain.T_root_0)
+    found = [np.array(chain.T_root_0)]
     for link in chain.links:
         theta, d = link.offset, link.d
         if link.joint_type != 'fixed':
             moved = link.gain * positions[link.joint or next(others)]
             theta += moved if link.joint_type == 'revolute' else 0.0
             d += moved if link.joint_type == 'prismatic' else 0.0
-        T = T @ basic_product(link.a, d, link.alpha, theta)
-    return T @ chain.T_n_tip
+        found.append(found[-1] @ basic_product(link.a, d, link.alpha, theta))
+    return [*found, found[-1] @ chain.T_n_tip]
 
 
 def quaternion_to_matrix(quaternion: Any) -> Any:
