@@ -71,7 +71,7 @@ clean:
 	rm -rf .venv .venv-kilted build install log *.egg-info
 
 $(VENV)/.ros: $(VENV)/.python $(SETTINGS)
-	@echo 'Installing ROS 2 and the tools into $(VENV) (about 400 MB, once)'
+	@echo 'Installing ROS 2 and the tools into $(VENV) (about 600 MB, once)'
 	@$(call INSTALL,--editable '.[$(NODE)]')
 	@touch $@
 

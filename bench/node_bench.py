@@ -7,6 +7,7 @@ process of its own, and poses to this one, which handles bytes only.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import closing, ExitStack
 import gc
 import math
@@ -85,9 +86,11 @@ def measure_node(report: Report, quick: bool) -> None:
     stay_on_this_machine()
     with ExitStack() as stack:
         load = stack.enter_context(closing(_Load()))
-        nodes = {}
+        nodes, checks = {}, {}
         for i, (name, kind) in enumerate(_NODES.items()):
-            nodes[name] = _start(stack, load, f'/bench_{i}', kind)
+            nodes[name], checks[name] = _start(stack, load, f'/bench_{i}', kind)
+        for name, node in nodes.items():
+            _wait_for_answers(load, node, checks[name])
         for turn in range(turns):  # forth and back, so that none is always first
             for name in nodes if turn % 2 == 0 else reversed(nodes):
                 before = cpu_ns(nodes[name].pid)
@@ -140,8 +143,10 @@ def _figures(
     return figures
 
 
-def _start(stack: ExitStack, load: _Load, namespace: str, kind: _Kind) -> _Node:
-    """Start a node, and wait until messages reach it and everything of it comes back."""
+def _start(
+    stack: ExitStack, load: _Load, namespace: str, kind: _Kind
+) -> tuple[_Node, Callable[[], None]]:
+    """Start a node; return it, and what raises an error once it has stopped by itself."""
     parameters: dict[str, str] = {}
     if kind.program == (_OURS,):
         parameters = lossless(namespace, FEET, _DEPTH)
@@ -151,13 +156,17 @@ def _start(stack: ExitStack, load: _Load, namespace: str, kind: _Kind) -> _Node:
     process, check = stack.enter_context(
         running_node(namespace, parameters, kind.program, own_session=False)
     )
-    node = _Node(namespace, process.pid, load.watch(namespace, kind))
+    return _Node(namespace, process.pid, load.watch(namespace, kind)), check
+
+
+def _wait_for_answers(load: _Load, node: _Node, check: Callable[[], None]) -> None:
+    """Wait until messages reach a node and everything of it comes back."""
     for _ in range(100):
         check()
         _, lost = load.send(node, 100.0, _TRIES, _SOON)
         if not lost:
-            return node
-    raise DemoError(f'no answer from the node in {namespace}')
+            return
+    raise DemoError(f'no answer from the node in {node.namespace}')
 
 
 class _Load:

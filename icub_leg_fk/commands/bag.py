@@ -88,7 +88,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='S',
         type=float,
         default=DEFAULT_TIMEOUT,
-        help='age of a joint beside the newest of its chain above which there is '
+        help='how far a joint may lag the newest of its chain, or else there is '
         f'no pose; 0 turns this off (default: {DEFAULT_TIMEOUT})',
     )
     parser.add_argument(

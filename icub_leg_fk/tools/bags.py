@@ -366,7 +366,7 @@ def _reason_and_mend(directory: Path, reason: str) -> tuple[str, str]:
         if 'version' in reason:
             return reason, 'a newer rosbags may read it; its files alone can be given'
         if not is_mcap and not is_sqlite:
-            return reason, 'its files must stand beside it'
+            return reason, 'its files must be in the same directory'
         return reason, _MEND['.mcap' if is_mcap else '.db3']
     if not is_mcap and not is_sqlite:
         return f'it has no {METADATA}', 'it is not a rosbag2 recording'

@@ -317,7 +317,7 @@ _OPTIONS: dict[str, dict[str, Any]] = {
         'metavar': '{s,ms,us,ns}',
         'choices': ('s', 'ms', 'us', 'ns'),
         'default': '',
-        'help': 'unit of the times in a CSV file (default: told by their size and the header)',
+        'help': 'unit of the times in a CSV file (default: from their size and the header)',
     },
     '--json': {'action': 'store_true', 'help': 'print JSON, for programs'},
     '--kinematics-file': {
