@@ -1,5 +1,6 @@
 """The joint input beyond its rules, which test_joint_input_sequences.py holds it to."""
 
+import math
 import tracemalloc
 
 import pytest
@@ -46,6 +47,16 @@ def test_a_message_is_rejected_as_a_whole(robot, names, positions, reason, fault
 def test_a_very_long_name_does_not_fill_the_log(robot):
     robot.send(0, ('x' * 100_000,) * 2)
     assert len(robot.take_look().faults['duplicate_name']) < 100
+
+
+@pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf, 1e150, 1e200])
+def test_an_angle_that_is_not_finite_holds_back_just_its_chain(robot, value):
+    positions = [-0.1] * 12
+    positions[3] = value
+    assert robot.ready(0, BOTH, positions) == ['right_leg']
+    look = left_leg(robot)
+    assert look.held_back == {'non_finite': 1}
+    assert str(look.joints['non_finite']) == str({'l_knee': value})
 
 
 @pytest.mark.parametrize(
