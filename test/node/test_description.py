@@ -14,7 +14,16 @@ from support.described_robots import (
     pinocchio_pose,
     REAL,
 )
-from support.node_harness import BOTH, FEET, LEFT, LOSSLESS, NodeProcess, Robot, SECOND
+from support.node_harness import (
+    BOTH,
+    FEET,
+    LEFT,
+    lines,
+    LOSSLESS,
+    NodeProcess,
+    Robot,
+    SECOND,
+)
 from support.node_oracle import oracle_pose, pose_matrix
 from support.robots import joint as a_joint
 from support.robots import robot as robot_of
@@ -29,6 +38,8 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 Q = [0.2, 0.1, -0.1, -0.5, -0.3, 0.1, 0.15, 0.05, 0.1, -0.4, -0.2, -0.1]
 CRANE = robot_of([a_joint(0), a_joint(1)])
 GOOD = own_description('v2_5')
+COMPUTING = 'computing with the description of {}'
+UNUSED = 'description of the robot not used'
 
 
 class DescribedRobot(Robot):
@@ -36,52 +47,45 @@ class DescribedRobot(Robot):
 
     def __init__(self, node):
         super().__init__(node)
-        self.descriptions = self.node.create_publisher(
+        self._node = node
+        self._publisher = self.node.create_publisher(
             String, 'robot_description', LATCHED
         )
         self.topic = f'{node.namespace}/robot_description'
-        self.wait_for_log = node.wait_for_log
-        self._log = node.log
+        self._text = None
         self._stamp = SECOND
 
-    def describe(self, text):
-        self.descriptions.publish(String(data=text))
+    def describe(self, text, said):
+        """Send a description that is not the last one, and wait until the node has said this."""
+        if text != self._text:
+            self._text = text
+            before = self._node.log().count(said)
+            self._publisher.publish(String(data=text))
+            self.until(lambda: self._node.log().count(said) > before, said)
 
     def poses_now(self):
         """Return the (4, 4) poses of both feet that answer a joint state."""
         self._stamp = self.connect(self._stamp) + 1000
         self.send(self._stamp, BOTH, Q)
-        return [
-            pose_matrix(self.take(self.poses[tip], self._stamp)[-1].pose)
-            for tip in FEET
-        ]
+        poses = [self.take(self.poses[tip], self._stamp)[-1].pose for tip in FEET]
+        return list(map(pose_matrix, poses))
 
-    def send_now(self, joint_prefix=''):
+    def left_leg(self, condition, joint_prefix=''):
+        """Wait until the left leg's status meets a condition."""
         names = [joint_prefix + name for name in BOTH]
-        self.send(self.node.get_clock().now().nanoseconds, names, Q)
+
+        def send():
+            self.send(self.node.get_clock().now().nanoseconds, names, Q)
+
+        self.statuses(lambda statuses: condition(statuses['left_leg']), meanwhile=send)
 
     def wait_for_status(self, level, words):
         """Wait until the left leg's status has this level and these words."""
-
-        def is_so(statuses):
-            status = statuses['left_leg']
-            return status.level == level and words in status.message
-
-        self.statuses(is_so, meanwhile=self.send_now)
-
-    def wait_for_value(self, words):
-        """Wait until the left leg's status says this of the description."""
-        self.statuses(
-            lambda statuses: (
-                words in statuses['left_leg'].values.get('description', '')
-            ),
-            meanwhile=self.send_now,
-        )
+        self.left_leg(lambda status: status.level == level and words in status.message)
 
     def said(self, severity):
         """Return what the node has said, from the text on."""
-        marked = [line for line in self._log().splitlines() if f'[{severity}]' in line]
-        return [line.partition('foot_pose_publisher]: ')[2] for line in marked]
+        return lines(self._node, severity)
 
 
 def assert_poses(found, text, tips=('l_foot_dh_frame', 'r_foot_dh_frame')):
@@ -112,47 +116,78 @@ def waiting():
         yield robot
 
 
+@pytest.fixture(scope='module')
+def with_tables(waiting):
+    """Return a robot whose node computes with tables, and looks for joints under a prefix.
+
+    The other one waits meanwhile: for longer than the five seconds after which it warns.
+    """
+    with (
+        NodeProcess({'joint_prefix': 'icub1/', **LOSSLESS}) as node,
+        DescribedRobot(node) as robot,
+    ):
+        yield robot
+
+
+def test_tables_are_held_against_the_description(with_tables):
+    robot = with_tables
+    near = "r_foot_dh_frame is up to 0.00 mm and 0.00 deg off the robot's own"
+    robot.describe(GOOD, f'right_leg: {near}')
+    far = f'_foot_dh_frame is up to {mm_between_versions():.2f} mm and 0.00 deg off the'
+    way = (
+        f'; description_from_topic:=true computes with the description on {robot.topic}'
+    )
+    robot.describe(own_description('v1'), f'right_leg: r{far}')
+    left, right = [line for line in robot.said('WARN') if line.endswith(way)]
+    assert left.startswith(f'left_leg: l{far}')
+    assert right.startswith(f'right_leg: r{far}')
+    robot.left_leg(  # no other level for that
+        lambda status: far in status.values['description'] and status.level == OK,
+        'icub1/',
+    )
+    assert robot.change(version='v1').successful
+    robot.left_leg(lambda status: ' 0.00 mm' in status.values['description'])
+    assert robot.change(version='').successful
+
+
+def test_joint_names_without_the_prefix_are_explained(with_tables):
+    with_tables.wait_for_status(
+        ERROR, '; \'l_hip_pitch\' is looked for with joint_prefix:=""'
+    )
+
+
 @pytest.fixture
 def described(waiting):
-    """Return that robot, once it has sent a good description."""
-    waiting.describe(GOOD)
-    waiting.wait_for_value('robot_v2_5')
+    """Return that robot, once the node computes with a good description."""
+    waiting.describe(GOOD, COMPUTING.format('robot_v2_5'))
     return waiting
 
 
 def test_it_waits_aloud(waiting):
-    waiting.wait_for_log(
-        'waiting for the description of the robot on '
-        f'{waiting.topic} to publish poses of left_leg, right_leg'
-    )
-    silence = (
-        f'no description of the robot has come on {waiting.topic}; it has 1 publisher'
-    )
+    topic = waiting.topic
+    silence = f'no description of the robot has come on {topic}; it has 1 publisher'
     waiting.wait_for_status(STALE, silence)
-    waiting.wait_for_log(silence)
+    waiting.until(lambda: silence in waiting.said('WARN'), silence)
+    words = (
+        f'the robot on {topic} to publish poses of left_leg, right_leg; joint states'
+    )
+    assert f'waiting for the description of {words}' in waiting.said('INFO')[0]
     assert not waiting.left
     result = waiting.change(version='v1')
     assert not result.successful
-    assert (
-        "version: found 'v1', allowed with description_from_topic: none"
-        in result.reason
-    )
+    assert "'v1', allowed with description_from_topic: none" in result.reason
 
 
 def test_poses_are_those_of_the_description_and_a_new_one_takes_effect(described):
     assert_poses(described.poses_now(), GOOD)
     other = own_description('v1')
-    described.describe(other)
-    described.wait_for_value('robot_v1')
+    described.describe(other, COMPUTING.format('robot_v1'))
     poses = described.poses_now()
     assert_poses(poses, other)
-    np.testing.assert_allclose(
-        poses[0], oracle_pose('left_leg', 'v1', Q[:6]), rtol=0, atol=1e-9
-    )
-    said = described.said('INFO')
-    assert any('(left_leg=urdf, root_link to l_foot_dh_frame)' in line for line in said)
-    for name in ('robot_v2_5', 'robot_v1'):
-        assert f'computing with the description of {name} on {described.topic}' in said
+    expected = oracle_pose('left_leg', 'v1', Q[:6])
+    np.testing.assert_allclose(poses[0], expected, rtol=0, atol=1e-9)
+    words = '(left_leg=urdf, root_link to l_foot_dh_frame)'
+    assert any(words in line for line in described.said('INFO'))
 
 
 @needs_real_robots
@@ -160,8 +195,7 @@ def test_poses_are_those_of_the_description_and_a_new_one_takes_effect(described
 def test_poses_of_real_robots(described, name):
     text = REAL[name].read_text()
     assert described.change(foot_frame='sole').successful
-    described.describe(text)
-    described.wait_for_value('iCub')
+    described.describe(text, COMPUTING.format('iCub'))
     assert_poses(described.poses_now(), text, ('l_sole', 'r_sole'))
     assert described.change(foot_frame='dh').successful
 
@@ -177,14 +211,17 @@ def test_poses_of_real_robots(described, name):
     ids=['half', 'empty', 'another robot', 'one leg'],
 )
 def test_one_that_cannot_be_used_changes_nothing(described, bad, fault):
-    errors = len(described.said('ERROR'))
-    described.describe(bad)
-    described.wait_for_status(ERROR, 'description of the robot not used')
-    (error,) = described.said('ERROR')[errors:]
+    described.describe(bad, UNUSED)
+    error = described.said('ERROR')[-1]
     assert fault in error
     assert error.endswith('; the one before stays')
     assert_poses(described.poses_now(), GOOD)
-    described.describe(GOOD)
+
+
+def test_diagnostics_show_the_error_as_long_as_it_lasts(described):
+    described.describe(CRANE, UNUSED)
+    described.wait_for_status(ERROR, UNUSED)
+    described.describe(GOOD, COMPUTING.format('robot_v2_5'))
     described.wait_for_status(OK, 'publishing')
 
 
@@ -198,53 +235,6 @@ def test_a_second_publisher_is_a_warning(described):
         f'description counts: {namespace}/other, {namespace}/robot',
     )
     other.destroy_node()
-
-
-@pytest.fixture(scope='module')
-def with_tables():
-    """Return a robot whose node computes with tables, and looks for joints under a prefix."""
-    with (
-        NodeProcess({'joint_prefix': 'icub1/', **LOSSLESS}) as node,
-        DescribedRobot(node) as robot,
-    ):
-        yield robot
-
-
-def test_tables_are_held_against_the_description(with_tables):
-    robot = with_tables
-    robot.describe(GOOD)
-    robot.wait_for_log(
-        "right_leg: r_foot_dh_frame is up to 0.00 mm and 0.00 deg off the robot's"
-    )
-    robot.describe(own_description('v1'))
-    off = f'_foot_dh_frame is up to {mm_between_versions():.2f} mm and 0.00 deg off the robot'
-    robot.wait_for_log(f'right_leg: r{off}')
-    way = f"'s own; description_from_topic:=true computes with the description on {robot.topic}"
-    robot.wait_for_log(way)
-    assert [line for line in robot.said('WARN') if way in line] == [
-        f'left_leg: l{off}{way}',
-        f'right_leg: r{off}{way}',
-    ]
-    assert robot.change(version='v1').successful
-    robot.wait_for_value('l_foot_dh_frame is up to 0.00 mm')
-    assert robot.change(version='').successful
-
-
-def test_a_difference_from_the_description_changes_no_level(with_tables):
-    with_tables.describe(own_description('v1'))
-    far = f'up to {mm_between_versions():.2f} mm'
-
-    def are_compared(statuses):
-        status = statuses['left_leg']
-        return far in status.values['description'] and status.level == OK
-
-    with_tables.statuses(are_compared, meanwhile=lambda: with_tables.send_now('icub1/'))
-
-
-def test_joint_names_without_the_prefix_are_explained(with_tables):
-    with_tables.wait_for_status(
-        ERROR, '; \'l_hip_pitch\' is looked for with joint_prefix:=""'
-    )
 
 
 def test_a_urdf_is_a_kinematics_file(tmp_path):

@@ -18,7 +18,6 @@ OK, WARN, ERROR, STALE = (
     DiagnosticStatus.ERROR,
     DiagnosticStatus.STALE,
 )
-DEGREES = [0.0, 0.0, 0.0, -45.0, 0.0, 0.0]
 
 
 class Logger:
@@ -94,12 +93,49 @@ def watch():
     return watch
 
 
-def check_is_said_twice(watch, line, patience=1, **bad):
-    """Check that something bad is said when it has lasted, and again only after it was well."""
+WANTED = ', '.join(LEFT)
+DEGREES = [0.0, 0.0, 0.0, -45.0] + [0.0] * 8
+LASTING = {
+    'names that never match': (
+        f'left_leg: no message on /joint_states has one of its joints ({WANTED}); names '
+        f'that came: {", ".join(RIGHT)}',
+        5,
+        {'names': RIGHT},
+    ),
+    'positions that are always empty': (
+        'no message on /joint_states has positions: position is empty',
+        5,
+        {'positions': []},
+    ),
+    'degrees': (
+        'left_leg: positions look like degrees, radians are expected: l_knee -45',
+        1,
+        {'positions': DEGREES},
+    ),
+    'simulated time that has not begun': (
+        'use_sim_time is set, but no time has come on /clock',
+        5,
+        {'has_time': False},
+    ),
+    'another node of the same name': (
+        'another node is called /node and publishes the same topics; give one of them '
+        'another name: --ros-args -r __node:=NAME',
+        5,
+        {'pose_publishers': ['/node', '/other', '/node']},
+    ),
+}
+
+
+@pytest.mark.parametrize('reason', LASTING)
+def test_what_lasts_is_said_once_and_again_only_after_it_was_well(watch, reason):
+    line, patience, bad = LASTING[reason]
     for _ in range(2):
         assert watch.looks(patience - 1, **bad) == []
         assert watch.looks(1, **bad) == [line]
         assert watch.looks(9, **bad) == []
+        level, message = watch.verdicts[0]
+        assert level in (WARN, ERROR)
+        assert message.startswith(line.removeprefix('left_leg: '))
         assert watch.looks(1) == []
 
 
@@ -124,15 +160,6 @@ def test_silence_with_publishers_of_another_type():
     )
 
 
-def test_names_that_never_match(watch):
-    wanted = ', '.join(LEFT)
-    line = (
-        f'left_leg: no message on /joint_states has one of its joints ({wanted}); names that '
-        f'came: {", ".join(RIGHT)}'
-    )
-    check_is_said_twice(watch, line, patience=5, names=RIGHT)
-
-
 def test_names_that_match_now_and_then(watch):
     for _ in range(5):
         assert watch.looks(3, names=RIGHT) + watch.looks(2) == []
@@ -142,23 +169,6 @@ def test_silence_in_between_is_not_well(watch):
     assert watch.looks(4, names=RIGHT) + watch.looks(3, names=()) == []
     assert len(watch.looks(1, names=RIGHT)) == 1
     assert watch.looks(1, names=()) + watch.looks(9, names=RIGHT) == []
-
-
-def test_positions_that_are_always_empty(watch):
-    line = 'no message on /joint_states has positions: position is empty'
-    check_is_said_twice(watch, line, patience=5, positions=[])
-    watch.looks(positions=[])
-    assert watch.verdicts == [(ERROR, line)] * 2
-
-
-def test_degrees(watch):
-    text = 'positions look like degrees, radians are expected: l_knee -45'
-    check_is_said_twice(watch, f'left_leg: {text}', positions=DEGREES + [0.0] * 6)
-    watch.looks(positions=DEGREES + [0.0] * 6)
-    assert watch.verdicts == [
-        (WARN, f'{text}; out of range: l_knee -45'),
-        (OK, 'publishing'),
-    ]
 
 
 def test_out_of_range_is_for_diagnostics_alone(watch):
@@ -225,20 +235,3 @@ def test_publishers_of_different_joints(watch):
         watch.input.send(watch.ms, LEFT)
         watch.looks(names=RIGHT, publishers=['/left', '/right'])
     assert watch.said[2:] == ['info: 2 publishers on /joint_states']
-
-
-def test_simulated_time_that_has_not_begun(watch):
-    line = 'use_sim_time is set, but no time has come on /clock'
-    check_is_said_twice(watch, line, patience=5, has_time=False)
-    watch.looks(has_time=False)
-    assert watch.verdicts == [(WARN, line)] * 2
-
-
-def test_another_node_of_the_same_name(watch):
-    line = (
-        'another node is called /node and publishes the same topics; give one of them another '
-        'name: --ros-args -r __node:=NAME'
-    )
-    check_is_said_twice(
-        watch, line, patience=5, pose_publishers=['/node', '/other', '/node']
-    )

@@ -33,26 +33,19 @@ def walk():
     return stamps, positions, forces, poses
 
 
-def test_every_pose_arrives_once_in_order_with_the_stamp_of_its_message(walk):
-    stamps, _, _, poses = walk
-    assert len(stamps) == 1188
-    for foot in FEET:
-        assert poses[foot].stamps() == stamps
-
-
-def test_every_pose_is_pinocchios(walk):
-    _, positions, _, poses = walk
-    for foot, chain, part in (
+@pytest.mark.parametrize(
+    ('foot', 'chain', 'part'),
+    [
         ('left_foot', 'left_leg', slice(6)),
         ('right_foot', 'right_leg', slice(6, 12)),
-    ):
-        for message, row in zip(poses[foot], positions, strict=True):
-            np.testing.assert_allclose(
-                pose_matrix(message.pose),
-                oracle_pose(chain, 'v2_5', row[part], 'sole'),
-                rtol=0,
-                atol=1e-12,
-            )
+    ],
+)
+def test_every_pose_arrives_once_in_order_and_is_pinocchios(walk, foot, chain, part):
+    stamps, positions, _, poses = walk
+    assert len(stamps) == 1188
+    assert poses[foot].stamps() == stamps
+    expected = [oracle_pose(chain, 'v2_5', row[part], 'sole') for row in positions]
+    np.testing.assert_allclose(matrices(poses[foot]), expected, rtol=0, atol=1e-12)
 
 
 def matrices(poses):

@@ -6,21 +6,19 @@ joint states, stamped `first` [s] and 1 s more each, and writes the poses that c
 standard output: by foot a list of [sec, x, y, z, qx, qy, qz, qw].
 """
 
-from dataclasses import dataclass
 import json
 import sys
-import time
 
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import DomainParticipant
-from cyclonedds.idl import IdlStruct
+from cyclonedds.idl import make_idl_struct
 from cyclonedds.idl.types import float64, int32, sequence, uint32
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
-DEADLINE = 60.0  # s
+ATTEMPTS = 600
 AGAIN = duration(milliseconds=100)
 SILENCE = duration(seconds=20)
 LOSSLESS = Qos(
@@ -28,52 +26,29 @@ LOSSLESS = Qos(
 )
 
 
-@dataclass
-class Time(IdlStruct, typename='builtin_interfaces::msg::dds_::Time_'):
-    sec: int32
-    nanosec: uint32
+NUMBERS = sequence[float64]
 
 
-@dataclass
-class Header(IdlStruct, typename='std_msgs::msg::dds_::Header_'):
-    stamp: Time
-    frame_id: str
+def message(package, name, /, **fields):
+    """Return the type of a ROS message, by its name in DDS."""
+    return make_idl_struct(name, f'{package}::msg::dds_::{name}_', fields)
 
 
-@dataclass
-class JointState(IdlStruct, typename='sensor_msgs::msg::dds_::JointState_'):
-    header: Header
-    name: sequence[str]
-    position: sequence[float64]
-    velocity: sequence[float64]
-    effort: sequence[float64]
-
-
-@dataclass
-class Point(IdlStruct, typename='geometry_msgs::msg::dds_::Point_'):
-    x: float64
-    y: float64
-    z: float64
-
-
-@dataclass
-class Quaternion(IdlStruct, typename='geometry_msgs::msg::dds_::Quaternion_'):
-    x: float64
-    y: float64
-    z: float64
-    w: float64
-
-
-@dataclass
-class Pose(IdlStruct, typename='geometry_msgs::msg::dds_::Pose_'):
-    position: Point
-    orientation: Quaternion
-
-
-@dataclass
-class PoseStamped(IdlStruct, typename='geometry_msgs::msg::dds_::PoseStamped_'):
-    header: Header
-    pose: Pose
+Time = message('builtin_interfaces', 'Time', sec=int32, nanosec=uint32)
+Header = message('std_msgs', 'Header', stamp=Time, frame_id=str)
+JointState = message(
+    'sensor_msgs',
+    'JointState',
+    header=Header,
+    name=sequence[str],
+    position=NUMBERS,
+    velocity=NUMBERS,
+    effort=NUMBERS,
+)
+Point = message('geometry_msgs', 'Point', **dict.fromkeys('xyz', float64))
+Quaternion = message('geometry_msgs', 'Quaternion', **dict.fromkeys('xyzw', float64))
+Pose = message('geometry_msgs', 'Pose', position=Point, orientation=Quaternion)
+PoseStamped = message('geometry_msgs', 'PoseStamped', header=Header, pose=Pose)
 
 
 class Client:
@@ -95,14 +70,13 @@ class Client:
 
     def connect(self, positions):
         """Send a posture again and again until every foot has answered."""
-        deadline = time.monotonic() + DEADLINE
-        tries = 0
         for foot, reader in self._readers.items():
-            while next(reader.take_iter(timeout=AGAIN), None) is None:
-                if time.monotonic() > deadline:
-                    sys.exit(f'no pose of {foot} in {DEADLINE} s')
-                tries += 1
-                self._send(Time(0, tries), positions)
+            for attempt in range(ATTEMPTS):
+                self._send(Time(0, attempt + 1), positions)
+                if next(reader.take_iter(timeout=AGAIN), None) is not None:
+                    break
+            else:
+                sys.exit(f'no pose of {foot} after {ATTEMPTS} messages')
 
     def ask(self, postures, first):
         """Send postures; return what has come when the last pose has, or when nothing comes."""

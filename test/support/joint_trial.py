@@ -166,11 +166,7 @@ FAULTS = (
     'position',
     'velocity',
     'cut',
-    'drop',
     'repeat',
-    'reverse',
-    'swap',
-    'stranger',
     'back',
     'late',
     'zero stamp',
@@ -276,17 +272,8 @@ def contents(publisher, number, step):
         velocities[at % len(velocities)] = step.value
     elif step.fault == 'cut':
         del positions[at:]
-    elif step.fault == 'drop':
-        del names[at : at + 1]
     elif step.fault == 'repeat' and n:
         names[-1] = names[at]
-    elif step.fault == 'reverse':
-        names.reverse()
-    elif step.fault == 'swap':
-        velocities, efforts = efforts, velocities
-    elif step.fault == 'stranger':
-        names.insert(at, 'stranger')
-        positions.insert(at, 0.0)
     return names, positions, velocities, efforts
 
 

@@ -153,6 +153,12 @@ class NodeProcess:
             time.sleep(0.005)
 
 
+def lines(node, severity):
+    """Return what a node has said, from the text on."""
+    marked = [line for line in node.log().splitlines() if f'[{severity}]' in line]
+    return [line.partition('foot_pose_publisher]: ')[2] for line in marked]
+
+
 def processes_of_session(session):
     """Return the commands of the live processes that belong to a session."""
     found = []
