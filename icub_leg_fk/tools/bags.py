@@ -413,10 +413,9 @@ def _refuse_other_content(path: Path, file: Path) -> None:
     head = first_bytes(file, len(beginning))
     if head == beginning:
         return
-    fault = f'is not {kind}' if head else 'is empty'
-    raise InputFileError(
-        str(path), fault if file == path else f'{file.name} in it {fault}'
-    )
+    place = '' if file == path else f'{file.name} in it '
+    found = f'is not {kind}' if head else 'is an empty file'
+    raise InputFileError(str(path), place + found)
 
 
 def _refuse_waiting_messages(path: Path, file: Path) -> None:

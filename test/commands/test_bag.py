@@ -578,8 +578,8 @@ def test_of_killed_recorders_the_sqlite_file_is_taken_and_the_mcap_file_explaine
         f'alone, or let `ros2 bag reindex {file.parent}` write one',
     )
     killed = RECORDINGS / 'mcap_killed'
-    refused(killed, 'mcap_killed: mcap_killed_0.mcap in it is empty')
-    refused(killed / 'mcap_killed_0.mcap', '_0.mcap: is empty')
+    refused(killed, 'mcap_killed: mcap_killed_0.mcap in it is an empty file')
+    refused(killed / 'mcap_killed_0.mcap', '_0.mcap: is an empty file')
     write_bag('in', joints=walk(5))
     Path('in/metadata.yaml').unlink()
     refused('in', '`mcap recover` mends its file')
@@ -617,7 +617,7 @@ def test_damage_and_missing_files_end_in_one_line_with_what_mends_them(storage, 
     for spoilt, words in (
         (data[: len(data) // 2], mend),
         (data[:20], mend),
-        (b'', 'is empty'),
+        (b'', 'is an empty file'),
         (b'x' * 5000, 'is not an '),
     ):
         file.write_bytes(spoilt)
