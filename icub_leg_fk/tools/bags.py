@@ -24,8 +24,8 @@ from icub_leg_fk.errors import (
     MissingDependencyError,
     OutputFileError,
 )
+from icub_leg_fk.kinematics.input_bytes import first_bytes
 from icub_leg_fk.stream.cdr import JOINT_STATE, read_layout
-from icub_leg_fk.tools.input_file import first_bytes
 from icub_leg_fk.tools.output_file import is_bag, whole_path
 from icub_leg_fk.tools.progress import Progress
 import yaml
