@@ -90,7 +90,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Draw the picture."""
     name = _name(args.recordings)
-    output = args.output or f'{Path(name).stem}.png'
+    output = f'{Path(name).stem}.png' if args.output is None else args.output
     check_output(output, args.force)
     chains = recorded_chains(args)
     with shown_progress(name) as progress:

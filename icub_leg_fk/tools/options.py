@@ -25,7 +25,7 @@ def add(parser: argparse._ActionsContainer, *names: str) -> None:
 
 def add_output(parser: argparse.ArgumentParser, purpose: str) -> None:
     """Add `--output` and `--force`."""
-    parser.add_argument('-o', '--output', metavar='FILE', type=path, help=purpose)
+    parser.add_argument('-o', '--output', metavar='FILE', help=purpose)
     add(parser, '--force')
 
 

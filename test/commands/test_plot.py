@@ -280,7 +280,7 @@ def test_failed_picture_leaves_nothing_behind(walking_csv, monkeypatch):
 WRONG = {  # words of a command, and of its answer
     'nowhere.csv': 'nowhere.csv: there is no such file',
     "''": "argument RECORDING: found ''",
-    "walking.csv -o ''": "found ''",
+    "walking.csv -o ''": "'': is not the name of a file",
     'loop': 'loop: is a loop of links',
     'walking.csv -o feet.bmp': 'found .bmp, allowed: .png, .svg, .pdf',
     'walking.csv -o none/feet.png': 'none/feet.png: there is no directory',
