@@ -156,7 +156,7 @@ def test_what_cannot_be_is_one_line(command):
             'in',
             '',
             'in: no description of the robot on /robot_description; topics of type '
-            'std_msgs/msg/String are /urdf',
+            'std_msgs/msg/String: /urdf',
         ),
         ('in', '/urdf', 'no description of the robot can be used: desc'),
         ('in', '--version v1', "--version: found 'v1', allowed"),
