@@ -639,23 +639,6 @@ def test_awkward_paths_are_opened(recorded, name):
         assert summary.joint_states == 10
 
 
-def test_private_records_of_an_mcap_file_are_passed_over():
-    """Kinds 0x80 to 0xFF are anybody's own; readers skip them (MCAP specification)."""
-    writer_module = pytest.importorskip('mcap.writer')
-    file = Path('private.mcap')
-    definition, _ = TYPES.generate_msgdef(JOINT_STATE, ros_version=2)
-    with file.open('wb') as stream:
-        writer = writer_module.Writer(stream, use_chunking=False)
-        writer.start('ros2')
-        schema = writer.register_schema(JOINT_STATE, 'ros2msg', definition.encode())
-        channel = writer.register_channel('/joint_states', 'cdr', schema)
-        for i in range(10):
-            writer.add_message(channel, START + i, joint_state(START + i), START + i)
-            stream.write(b'\x80' + (3).to_bytes(8, 'little') + b'abc')
-        writer.finish()
-    assert add_foot_poses(file, 'out').joint_states == 10
-
-
 def test_a_type_hash_that_is_not_recorded_comes_from_the_definition():
     write_bag('in', joints=walk(5))
     assert add_foot_poses('in/in.mcap', 'out').notes == []

@@ -102,28 +102,35 @@ def channels_of(file):
     return found
 
 
-@pytest.mark.parametrize('compression', ['ZSTD', 'LZ4'])
+@pytest.mark.parametrize('compression', ['ZSTD', 'LZ4', ''])
 def test_bags_of_the_mcap_library_are_read(tmp_path, compression):
-    """With publish times, sequence numbers, attachments and disorder, of which order is kept."""
+    """With publish times, sequence numbers, attachments and disorder, of which order is kept.
+
+    One without chunks has records of kind 0x80 between, which anybody may have.
+    """
     definition, _ = TYPES.generate_msgdef(JOINT_STATE, ros_version=2)
-    writer = writing.Writer(
-        str(tmp_path / 'in.mcap'),
-        chunk_size=20_000,
-        compression=writing.CompressionType[compression],
-    )
-    writer.start('ros2', 'a robot')
-    schema = writer.register_schema(JOINT_STATE, 'ros2msg', definition.encode())
     topics = ('/joint_states', '/others')
-    channels = [writer.register_channel(topic, 'cdr', schema) for topic in topics]
     expected = []
-    for i in range(400):
-        late = 7 if i % 10 == 0 else 0
-        time = START + 1_000_000 * (i + late)
-        data = joint_state(time)
-        writer.add_message(channels[i % 2], time, data, time - 500, i)
-        expected.append((topics[i % 2], time, data))
-    writer.add_attachment(START, START, 'calibration.txt', 'text/plain', b'1 2 3')
-    writer.finish()
+    with (tmp_path / 'in.mcap').open('wb') as stream:
+        writer = writing.Writer(
+            stream,
+            chunk_size=20_000,
+            compression=writing.CompressionType[compression or 'NONE'],
+            use_chunking=bool(compression),
+        )
+        writer.start('ros2', 'a robot')
+        schema = writer.register_schema(JOINT_STATE, 'ros2msg', definition.encode())
+        channels = [writer.register_channel(topic, 'cdr', schema) for topic in topics]
+        for i in range(400):
+            late = 7 if compression and i % 10 == 0 else 0
+            time = START + 1_000_000 * (i + late)
+            data = joint_state(time)
+            writer.add_message(channels[i % 2], time, data, time - 500, i)
+            expected.append((topics[i % 2], time, data))
+            if not compression:
+                stream.write(b'\x80' + (3).to_bytes(8, 'little') + b'abc')
+        writer.add_attachment(START, START, 'calibration.txt', 'text/plain', b'1 2 3')
+        writer.finish()
     add_foot_poses(tmp_path / 'in.mcap', tmp_path / 'out.mcap')
     _, found = read_mcap(tmp_path / 'out.mcap')
     expected.sort(key=lambda row: row[1])
