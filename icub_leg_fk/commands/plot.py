@@ -12,7 +12,7 @@ from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.tools import options
 from icub_leg_fk.tools.drawing import check_output, feet_figure, LETTERS, save_picture
-from icub_leg_fk.tools.progress import Progress, shown_progress
+from icub_leg_fk.tools.progress import part_of, Progress, shown_progress
 from icub_leg_fk.tools.recorded_robot import Described, recorded_chains
 from icub_leg_fk.tools.tracks import ChainTrack, read_tracks, time_span
 import numpy as np
@@ -90,14 +90,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Draw the picture."""
     name = _name(args.recordings)
-    output = args.output or f'{Path(name).stem}.png'
+    output = f'{Path(name).stem}.png' if args.output is None else args.output
     check_output(output, args.force)
     chains = recorded_chains(args)
     with shown_progress(name) as progress:
-        tracks = _tracks(args.recordings, chains, args, _part(progress, 0.0))
-        over = (
-            _tracks(args.over, chains, args, _part(progress, 0.5)) if args.over else []
-        )
+        drawn = [each for each in (args.recordings, args.over) if each]
+        shares = [0.0] * len(drawn)
+        read = []
+        for place, recordings in enumerate(drawn):
+            part = part_of(progress, shares, place)
+            read.append(_tracks(recordings, chains, args, part))
+        tracks, *others = read
+        over = others[0] if others else []
         instants = (
             _checked_instants(args.at, tracks) if args.at else default_instants(tracks)
         )
@@ -220,13 +224,6 @@ def _times(text: str) -> list[float]:
             'times in seconds, separated by commas'
         )
     return times
-
-
-def _part(progress: Progress | None, begin: float) -> Progress | None:
-    """Return what takes the share of one of two recordings that is read, and tells that of all."""
-    if progress is None:
-        return None
-    return lambda share: progress(begin + 0.5 * share)
 
 
 def _name(recordings: Sequence[str]) -> str:

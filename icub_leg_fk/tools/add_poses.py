@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 import os
@@ -199,16 +199,18 @@ def add_foot_poses(
                 '--replace-poses leaves these out, --only-poses writes the new',
             )
         with new_bag(target, storage, force=force) as writer:
-            copy = _Copy(writer, bag, old, types)
-            poses = _Poses(writer, added, copy, types)
-            _run(bag, joint_states, copy, poses, progress)
+            for name, value in bag.custom_data.items():
+                writer.set_custom_data(name, str(value))
+            copies = {each.id: types.copied(each, writer) for each in old.kept}
+            poses = _Poses(writer, added, copies.values(), types)
+            count = _write(bag, joint_states, copies, old, poses, progress)
             look = poses.robot_input.take_look()
             _refuse_strangers(source, look, joint_prefix)
     notes = notes_of(look, ' and '.join(topics), joint_prefix, PREFIX_OPTION)
     return Summary(
         source=str(source),
         target=str(target),
-        copied=copy.count,
+        copied=count,
         added=dict(poses.added),
         joint_states=look.messages,
         rejected=dict(look.rejected),
@@ -322,7 +324,18 @@ class _Types:
         self.store = self._typesys.get_typestore(self._typesys.Stores.ROS2_JAZZY)
         self.notes: list[str] = []
 
-    def hash_of(self, connection: Connection) -> str:
+    def copied(self, old: Connection, writer: Any) -> Connection:
+        """Add a topic of a recording to another one."""
+        return writer.add_connection(
+            old.topic,
+            old.msgtype,
+            msgdef=old.msgdef.data,
+            rihs01=self._hash_of(old),
+            serialization_format='cdr',
+            offered_qos_profiles=old.ext.offered_qos_profiles,
+        )
+
+    def _hash_of(self, connection: Connection) -> str:
         """Return a type's hash: as recorded, or else from the definition."""
         if connection.digest:
             return str(connection.digest)
@@ -332,24 +345,6 @@ class _Types:
             note = f'the type hash of {connection.msgtype} is not known'
             self.notes.append(f'{note}; {_UNKNOWN_HASH[:9]}... stands for it')
             return _UNKNOWN_HASH
-
-    def frames(self, data: bytes) -> list[str]:
-        """Return the child frame ids of a TFMessage."""
-        message = self.store.deserialize_cdr(data, TF)
-        return [transform.child_frame_id for transform in message.transforms]
-
-    def without_frames(self, data: bytes, frames: Collection[str]) -> bytes | None:
-        """Return a TFMessage without some child frames; None if nothing is left of it."""
-        message = self.store.deserialize_cdr(data, TF)
-        kept = [
-            each for each in message.transforms if each.child_frame_id not in frames
-        ]
-        if len(kept) == len(message.transforms):
-            return data
-        if not kept:
-            return None
-        message.transforms = kept
-        return bytes(self.store.serialize_cdr(message, TF))
 
     def _store_of(self, connection: Connection) -> Any:
         """Return the types that a recording defines itself, or those of Jazzy."""
@@ -370,7 +365,6 @@ class _OldPoses:
     Attributes:
         kept: the connections to copy.
         transforms: ids of those on which are transforms that are not to be copied.
-        frames: the child frames of these.
         found: what there is, in words.
         notes: the same, as what is left out.
     """
@@ -386,80 +380,65 @@ class _OldPoses:
         poses = [each for each in connections if each.topic in topics]
         self.kept = [each for each in connections if each.topic not in topics]
         self.transforms: set[int] = set()
-        self.frames = added.frames
         self.found = list(dict.fromkeys(each.topic for each in poses))
+        self._frames = added.frames
+        self._store = types.store
         for connection in self.kept:
             is_tf = connection.topic in TF_TOPICS and connection.msgtype == TF
-            if is_tf and self.frames:
-                self._look_for_frames(bag, connection, types)
+            frames = self._frames_on(connection, bag) if is_tf else set()
+            if frames:
+                self.transforms.add(connection.id)
+                self.found.append(
+                    f'{connection.topic} with {", ".join(sorted(frames))}'
+                )
         self.notes = [f'left out: {each} of the recording' for each in self.found]
 
-    def _look_for_frames(
-        self, bag: Bag | _NoBag, connection: Connection, types: _Types
-    ) -> None:
-        sought = {frame.encode() + b'\0': frame for frame in self.frames}
+    def rest_of(self, data: bytes) -> bytes | None:
+        """Return a TFMessage without the transforms made anew; None if nothing is left of it."""
+        message = self._store.deserialize_cdr(data, TF)
+        there = len(message.transforms)
+        message.transforms = [
+            each
+            for each in message.transforms
+            if each.child_frame_id not in self._frames
+        ]
+        if len(message.transforms) == there:
+            return data
+        return self._store.serialize_cdr(message, TF) if message.transforms else None
+
+    def _frames_on(self, connection: Connection, bag: Bag | _NoBag) -> set[str]:
+        """Return which of the frames that are added are on a topic of transforms."""
+        names = [frame.encode() + b'\0' for frame in self._frames]
         found: set[str] = set()
         for _, _, data in bag.messages([connection]):
-            may_have = any(name in data for name in sought)  # `a/x` has `x`, too
+            may_have = any(name in data for name in names)  # `a/x` has `x`, too
             if may_have:
-                found.update(self.frames.intersection(types.frames(data)))
-        if found:
-            self.transforms.add(connection.id)
-            self.found.append(f'{connection.topic} with {", ".join(sorted(found))}')
-
-
-class _Copy:
-    """Writes what is copied of a recording.
-
-    Attributes:
-        count: messages copied.
-        connections: those of the new recording, by the ids of the old ones.
-    """
-
-    def __init__(
-        self, writer: Any, bag: Bag | _NoBag, old: _OldPoses, types: _Types
-    ) -> None:
-        for name, value in bag.custom_data.items():
-            writer.set_custom_data(name, str(value))
-        self.count = 0
-        self.connections = {
-            each.id: writer.add_connection(
-                each.topic,
-                each.msgtype,
-                msgdef=each.msgdef.data,
-                rihs01=types.hash_of(each),
-                serialization_format='cdr',
-                offered_qos_profiles=each.ext.offered_qos_profiles,
-            )
-            for each in old.kept
-        }
-        self._write = writer.write
-        self._old = old
-        self._types = types
-
-    def write(self, connection: Connection, timestamp: int, data: bytes) -> None:
-        """Copy a message, but for the transforms that are made anew."""
-        kept: bytes | None = data
-        if connection.id in self._old.transforms:
-            kept = self._types.without_frames(data, self._old.frames)
-        if kept is not None:
-            self._write(self.connections[connection.id], timestamp, kept)
-            self.count += 1
+                message = self._store.deserialize_cdr(data, TF)
+                found.update(each.child_frame_id for each in message.transforms)
+        return found & self._frames
 
 
 class _Poses:
     """Writes what joint states give.
 
     Attributes:
+        writer: what writes them.
         robot_input: what takes the joint states.
         added: messages written, by topic.
     """
 
-    def __init__(self, writer: Any, added: _Added, copy: _Copy, types: _Types) -> None:
+    def __init__(
+        self,
+        writer: Any,
+        added: _Added,
+        copies: Iterable[Connection],
+        types: _Types,
+    ) -> None:
+        self.writer = writer
         configuration = added.configuration
         self._time = 0  # when the present message was recorded [ns]
         self.added = dict.fromkeys(added.topics, 0)
-        there = {(each.topic, each.msgtype): each for each in copy.connections.values()}
+        there = {(each.topic, each.msgtype): each for each in copies}
         send = {}
         for topic, kind in added.topics.items():
             connection = there.get((topic, kind))
@@ -471,7 +450,7 @@ class _Poses:
                     typestore=types.store,
                     offered_qos_profiles=[reliable_qos(depth)],
                 )
-            send[topic] = self._sender(writer, connection)
+            send[topic] = self._sender(connection)
         senders = {
             chain.name: Senders(
                 send[added.topic(chain, 'pose')], send.get(added.topic(chain, 'twist'))
@@ -497,8 +476,8 @@ class _Poses:
         vectors = self.robot_input.feed(timestamp, data)  # which may begin a new stream
         self._stream.send(vectors)
 
-    def _sender(self, writer: Any, connection: Any) -> Send:
-        write = writer.write
+    def _sender(self, connection: Connection) -> Send:
+        write = self.writer.write
         added = self.added
         topic = connection.topic
 
@@ -509,22 +488,38 @@ class _Poses:
         return send
 
 
-def _run(
+def _write(
     bag: Bag | _NoBag,
     joint_states: Iterable[Connection],
-    copy: _Copy,
+    copies: Mapping[int, Connection],
+    old: _OldPoses,
     poses: _Poses,
     progress: Progress | None,
-) -> None:
-    """Copy the messages, each of joint states followed by what it gives."""
+) -> int:
+    """Copy messages, each of joint states followed by what it gives; return how many were copied.
+
+    Args:
+        bag: the recording.
+        joint_states: its joint states.
+        copies: what takes the place of its connections, by their ids.
+        old: which transforms are made anew.
+        poses: takes the joint states.
+        progress: called now and then with the share that is done, 0 to 1.
+    """
+    count = 0
+    write = poses.writer.write
     joint_ids = {each.id for each in joint_states}
-    copied_ids = copy.connections.keys()
-    wanted = [each for each in bag.connections if each.id in copied_ids | joint_ids]
+    wanted = [each for each in bag.connections if each.id in copies.keys() | joint_ids]
     for connection, timestamp, data in bag.messages(wanted, progress):
-        if connection.id in copied_ids:
-            copy.write(connection, timestamp, data)
-        if connection.id in joint_ids:
+        id_ = connection.id
+        if id_ in copies:
+            kept = old.rest_of(data) if id_ in old.transforms else data
+            if kept is not None:
+                write(copies[id_], timestamp, kept)
+                count += 1
+        if id_ in joint_ids:
             poses.take(timestamp, data)
+    return count
 
 
 @contextmanager

@@ -25,8 +25,8 @@ from icub_leg_fk.errors import (
     MissingDependencyError,
     OutputFileError,
 )
+from icub_leg_fk.kinematics.input_bytes import first_bytes
 from icub_leg_fk.stream.cdr import JOINT_STATE, read_layout
-from icub_leg_fk.tools.input_file import first_bytes
 from icub_leg_fk.tools.output_file import is_bag, whole_path
 from icub_leg_fk.tools.progress import Progress
 import yaml
@@ -283,25 +283,16 @@ def _stored_connections(reader: Any) -> list[Connection]:
     """Return the topics of the files: of several that are alike one, with the messages of all."""
     if not hasattr(reader.storage, 'storages'):  # a single file
         return list(reader.connections)
-    found: list[Connection] = []
-    places: dict[
-        tuple[str, str], list[int]
-    ] = {}  # in what was found, by topic and type
+    merged: dict[tuple[str, ...], Connection] = {}
     for storage in reader.storage.storages:
         for each in storage.connections:
-            alike = places.setdefault((each.topic, each.msgtype), [])
-            place = next(
-                (place for place in alike if found[place].ext == each.ext), None
-            )
-            if place is None:
-                alike.append(len(found))
-                found.append(
-                    each._replace(id=-1 - len(found))
-                )  # no id that metadata.yaml has
-            else:
-                total = found[place].msgcount + each.msgcount
-                found[place] = found[place]._replace(msgcount=total)
-    return found
+            key = each.topic, each.msgtype, repr(each.ext)
+            if key in merged:
+                total = merged[key].msgcount + each.msgcount
+                merged[key] = merged[key]._replace(msgcount=total)
+            else:  # with an id that metadata.yaml does not have
+                merged[key] = each._replace(id=-1 - len(merged))
+    return list(merged.values())
 
 
 def _paired(

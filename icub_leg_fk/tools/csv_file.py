@@ -17,9 +17,10 @@ from typing import NamedTuple
 
 from icub_leg_fk.errors import InputFileError
 from icub_leg_fk.kinematics import Chain
+from icub_leg_fk.kinematics.input_bytes import first_bytes
 from icub_leg_fk.stream.cdr import JointStateEncoder
 from icub_leg_fk.stream.notes import name_hint
-from icub_leg_fk.tools.input_file import first_bytes, lines_of
+from icub_leg_fk.tools.input_file import lines_of
 from icub_leg_fk.tools.joint_states import Messages, Part, SECOND
 from icub_leg_fk.tools.options import LARGEST, number
 from icub_leg_fk.tools.progress import Progress

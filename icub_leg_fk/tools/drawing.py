@@ -58,6 +58,7 @@ _POSITION = ('z', 'x', 'y')
 _ORIENTATION = ('roll', 'pitch', 'yaw')
 _LEAST_SPANS = (0.01, 1.0)  # m and deg; smaller movements are hardly meant to be seen
 _LONGEST_NAME = 45  # characters of a joint's
+_OVER: dict[str, Any] = {'linewidth': 1.5, 'linestyle': (0, (4, 2)), 'alpha': 0.6}
 _SETTINGS: dict[str, Any] = {
     'font.family': 'sans-serif',
     'font.sans-serif': ['DejaVu Sans'],
@@ -285,7 +286,7 @@ def _draw_curves(
 ) -> None:
     """Draw a coordinate of all tips; where two are the same, both can be seen."""
     for track in over:
-        _draw_curve(panel, track, name, linestyle=(0, (4, 2)), alpha=0.6, linewidth=1.5)
+        _draw_curve(panel, track, name, **_OVER)
     for track in tracks:
         _draw_curve(panel, track, name, linewidth=2)
     for i, track in enumerate(tracks[:-1]):
@@ -416,12 +417,7 @@ def _draw_scenes(
     rows = math.ceil(len(instants) / 2)
     width = box.width / columns
     height = box.height / rows
-    points = []
-    for instant in instants:
-        for track in (*tracks, *over):
-            points.append(
-                track.chain.frames(track.positions[track.nearest(instant)])[:, :3, 3]
-            )
+    points = [each.points_at(t) for each in (*tracks, *over) for t in instants]
     everywhere = np.vstack(points)
     for i, instant in enumerate(instants):
         left = box.left + width * (i % columns)
@@ -449,22 +445,14 @@ def _draw_scene(
     space.root()
     for track in over:
         if track.covers(instant):
-            space.chain(
-                track.chain, track.positions[track.nearest(instant)], 5, alpha=0.3
-            )
-    there = [
-        (track, track.nearest(instant)) for track in tracks if track.covers(instant)
-    ]
-
-    def depth(sample: tuple[ChainTrack, int]) -> float:
-        track, i = sample
-        return space.depth(track.chain.frames(track.positions[i])[:, :3, 3])
-
-    for rank, (track, i) in enumerate(sorted(there, key=depth)):
+            space.chain(track.chain, track.positions_at(instant), 5, alpha=0.3)
+    there = [track for track in tracks if track.covers(instant)]
+    there.sort(key=lambda track: space.depth(track.points_at(instant)))
+    for rank, track in enumerate(there):
         zorder = 10.0 * (rank + 1)
-        q = track.positions[i]
+        q = track.positions_at(instant)
         space.line(
-            track.path_around(i, _TRAIL),
+            track.path_around(instant, _TRAIL),
             color=color_of(track.chain),
             linewidth=1,
             alpha=0.5,
@@ -482,23 +470,16 @@ def _draw_legend(
     over_name: str,
 ) -> None:
     """Draw what the lines are, in a row that is as wide as the figure at most."""
-    Line2D = import_matplotlib().lines.Line2D
-    lines = {
-        _label(track): Line2D([], [], color=color_of(track.chain), linewidth=2)
-        for track in tracks
-    }
+    styles: dict[str, dict[str, Any]] = {}
+    for track in tracks:
+        styles[_label(track)] = {'color': color_of(track.chain), 'linewidth': 2}
     for track in over:
-        lines[f'{_label(track)}, {over_name}'] = Line2D(
-            [],
-            [],
-            color=color_of(track.chain),
-            linewidth=1.5,
-            linestyle=(0, (4, 2)),
-            alpha=0.6,
-        )
-    lines[f'path of a tip, {_TRAIL:g} s before and after'] = Line2D(
-        [], [], color=FAINT, linewidth=1, alpha=0.5
-    )
+        label = f'{_label(track)}, {over_name}'
+        styles[label] = {'color': color_of(track.chain), **_OVER}
+    trail = f'path of a tip, {_TRAIL:g} s before and after'
+    styles[trail] = {'color': FAINT, 'linewidth': 1, 'alpha': 0.5}
+    Line2D = import_matplotlib().lines.Line2D
+    lines = {label: Line2D([], [], **style) for label, style in styles.items()}
     legend = figure.legend(
         lines.values(),
         lines.keys(),

@@ -1,25 +1,13 @@
-"""Reading a text file line by line, and the first bytes of any file."""
+"""Reading a text file line by line."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 import io
 from pathlib import Path
-from typing import BinaryIO
 
 from icub_leg_fk.errors import InputFileError
 from icub_leg_fk.tools.progress import Progress
 
 _LINES = 1000  # between two looks at how far a file is read
-
-
-def first_bytes(path: Path, count: int) -> bytes:
-    """Return so many bytes of a file, or as many as it has.
-
-    Raises:
-        InputFileError: it cannot be read.
-    """
-    with _opened(path) as stream:
-        return stream.read(count)
 
 
 def lines_of(
@@ -35,23 +23,16 @@ def lines_of(
     Raises:
         InputFileError: it cannot be read, or is not text of this encoding.
     """
-    with _opened(path) as stream:
-        size = max(1, path.stat().st_size)
-        try:
+    try:
+        with path.open('rb') as stream:
+            size = max(1, path.stat().st_size)
             for number, line in enumerate(io.TextIOWrapper(stream, encoding)):
                 if progress is not None and number % _LINES == 0:
                     progress(stream.tell() / size)
                 yield line
-        except UnicodeDecodeError as error:
-            fault = f'is not text in {encoding}: {error.reason}'
-            raise InputFileError(str(path), fault) from error
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[BinaryIO]:
-    try:
-        with path.open('rb') as stream:
-            yield stream
+    except UnicodeDecodeError as error:
+        fault = f'is not text in {encoding}: {error.reason}'
+        raise InputFileError(str(path), fault) from error
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise InputFileError(str(path), f'cannot be read: {reason}') from error

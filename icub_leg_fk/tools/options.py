@@ -1,7 +1,7 @@
 """What subcommands share: options by their names, and the chains and joint positions they mean."""
 
 import argparse
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 import math
 from pathlib import Path
 import sys
@@ -25,7 +25,7 @@ def add(parser: argparse._ActionsContainer, *names: str) -> None:
 
 def add_output(parser: argparse.ArgumentParser, purpose: str) -> None:
     """Add `--output` and `--force`."""
-    parser.add_argument('-o', '--output', metavar='FILE', type=path, help=purpose)
+    parser.add_argument('-o', '--output', metavar='FILE', help=purpose)
     add(parser, '--force')
 
 
@@ -137,13 +137,8 @@ def chains_of(catalog: Catalog, args: argparse.Namespace) -> list[Chain]:
     """
     refuse_no_chains(catalog)
     legs = [name for name in LEGS if name in catalog.chains]
-    configuration = Configuration.checked(
-        catalog,
-        chains=args.chains or legs or list(catalog.chains),
-        version=args.version or '',
-        joint_prefix=getattr(args, 'joint_prefix', ''),
-        foot_frame=args.foot_frame or DEFAULT_FRAME,
-    )
+    names = args.chains or legs or list(catalog.chains)
+    configuration = Configuration.checked(catalog, **settings_of(args, names))
     chains = configuration.chains
     roots = sorted({chain.root_frame for chain in chains})
     if len(roots) > 1:
@@ -154,6 +149,16 @@ def chains_of(catalog: Catalog, args: argparse.Namespace) -> list[Chain]:
     if args.foot_frame:
         print_notes([], configuration.notes)
     return list(chains)
+
+
+def settings_of(args: argparse.Namespace, chains: Sequence[str]) -> dict[str, Any]:
+    """Return what `Configuration.checked` takes, with the names of chains."""
+    return {
+        'chains': chains,
+        'version': args.version or '',
+        'joint_prefix': getattr(args, 'joint_prefix', ''),
+        'foot_frame': args.foot_frame or DEFAULT_FRAME,
+    }
 
 
 def print_notes(warnings: Iterable[str], notes: Iterable[str]) -> None:

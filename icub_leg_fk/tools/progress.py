@@ -14,6 +14,26 @@ Progress = Callable[[float], None]  # takes the share that is done, 0 to 1
 _PATIENCE = 1.0  # s; a shorter task shows nothing
 
 
+def part_of(
+    progress: Progress | None, shares: list[float], place: int
+) -> Progress | None:
+    """Return what takes the share of one part of a task, and shows that of all.
+
+    Args:
+        progress: shows it; None for nothing.
+        shares: those of all parts.
+        place: of this part in them.
+    """
+    if progress is None:
+        return None
+
+    def show(share: float) -> None:
+        shares[place] = share
+        progress(sum(shares) / len(shares))
+
+    return show
+
+
 @contextmanager
 def shown_progress(what: str) -> Iterator[Progress | None]:
     """Give what shows the share of a task that is done, on stderr while the block lasts.

@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 import math
 from typing import Any, NamedTuple
 
 from icub_leg_fk.errors import InputFileError, LegFKError, ParameterError
 from icub_leg_fk.kinematics import Catalog, Chain, Urdf
 from icub_leg_fk.stream.cdr import read_string
-from icub_leg_fk.stream.configuration import Configuration, DEFAULT_FRAME, LEGS
+from icub_leg_fk.stream.configuration import Configuration, LEGS
 from icub_leg_fk.stream.description import compared, PARAMETER
 from icub_leg_fk.stream.joint_input import JointInput, Look, Ready
 from icub_leg_fk.tools import options
@@ -132,12 +133,7 @@ def recorded_chains(args: argparse.Namespace) -> Sequence[Chain] | Described:
     if not args.description_from_topic:
         return options.chains_of_one_root(args)
     refuse_second_source(args.kinematics_file)
-    settings = {
-        'chains': args.chains or LEGS,
-        'version': args.version or '',
-        'joint_prefix': args.joint_prefix,
-        'foot_frame': args.foot_frame or DEFAULT_FRAME,
-    }
+    settings = options.settings_of(args, args.chains or LEGS)
     return Described(args.description_from_topic, args.root, settings)
 
 
@@ -161,31 +157,36 @@ def robot_of(
     """
     named: bool | str = True
     joints: list[str] = []
+    most = None
     if isinstance(chains, Described):
         named = chains.topic
     else:
         joints = [name for chain in chains for name in chain.joint_names]
+        most = 1  # which the tables are held against
     sent: list[_Sent] = []
-    topics: list[str] = []
+    topics: dict[str, None] = {}
     for bag in bags:
         topic = (
             named if isinstance(named, str) else _topic_of(bag, joint_topics, joints)
         )
-        topics.append(topic)
+        topics[topic] = None
         messages = bag.messages(bag.connections_of(STRING, [topic]))
-        sent += [_Sent(time, topic, data) for _, time, data in messages]
+        sent += [_Sent(time, topic, data) for _, time, data in islice(messages, most)]
     sent.sort()
     if not isinstance(chains, Described):
-        return _compared(chains, sent[:1], joint_prefix)
+        return _compared(chains, sent[:most], joint_prefix)
+    name = ', '.join(str(bag.path) for bag in bags)
     if not sent:
-        raise _no_description(bags, ' or '.join(dict.fromkeys(topics)))
-    start = min(bag.span[0] for bag in bags)
-    robot = _described(chains, sent, start)
-    if not robot.periods:
+        others = {topic for bag in bags for topic in bag.topics(STRING)}
         raise InputFileError(
-            ', '.join(str(bag.path) for bag in bags),
-            f'no description of the robot can be used: {robot.warnings[0]}',
+            name,
+            f'no description of the robot on {" or ".join(topics)}; topics of type '
+            f'{STRING}: {", ".join(sorted(others)) or "none"}',
         )
+    robot = _described(chains, sent, min(bag.span[0] for bag in bags))
+    if not robot.periods:
+        fault = f'no description of the robot can be used: {robot.warnings[0]}'
+        raise InputFileError(name, fault)
     return robot
 
 
@@ -200,17 +201,6 @@ class _Sent(NamedTuple):
 def _topic_of(bag: Bag, joint_topics: Sequence[str], joints: Sequence[str]) -> str:
     connections = bag.joint_connections(joint_topics, joints)
     return f'{namespace_of(each.topic for each in connections)}/{_TOPIC}'
-
-
-def _no_description(bags: Sequence[Bag], topic: str) -> InputFileError:
-    others = sorted({name for bag in bags for name in bag.topics(STRING)})
-    there = f'it has no topic of type {STRING}'
-    if others:
-        there = f'topics of type {STRING} are {", ".join(others)}'
-    return InputFileError(
-        ', '.join(str(bag.path) for bag in bags),
-        f'no description of the robot on {topic}; {there}',
-    )
 
 
 def _described(wanted: Described, sent: Sequence[_Sent], start: int) -> Robot:

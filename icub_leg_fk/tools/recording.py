@@ -33,7 +33,7 @@ from icub_leg_fk.tools.bags import (
 )
 from icub_leg_fk.tools.csv_file import CsvFile
 from icub_leg_fk.tools.joint_states import Messages, Part, SECOND
-from icub_leg_fk.tools.progress import Progress
+from icub_leg_fk.tools.progress import part_of, Progress
 from icub_leg_fk.tools.recorded_robot import (
     Described,
     OPTION,
@@ -132,7 +132,7 @@ class Recording:
         shares = [0.0] * len(self._parts)
         streams = []
         for place, part in enumerate(self._parts):
-            streams.append(part.messages(_share_of(place, shares, progress)))
+            streams.append(part.messages(part_of(progress, shares, place)))
         return heapq.merge(*streams, key=itemgetter(0))
 
     def span(self) -> tuple[int, int]:
@@ -178,7 +178,9 @@ def open_recording(
             for path in places
             if has_topics(path)
         }
-        refuse_topics(places[0], chains, topics, bags)
+        if not bags and (topics or isinstance(chains, Described)):
+            option = '--joint-topic' if topics else OPTION
+            raise LegFKError(f'{option}: {places[0]} has no topics')
         robot = robot_of(chains, list(bags.values()), topics, joint_prefix)
         chains = robot.periods[0].chains
         names = dict.fromkeys(name for chain in chains for name in chain.joint_names)
@@ -189,18 +191,6 @@ def open_recording(
             else:
                 parts += parts_without_topics(path, chains, time_unit)
         yield Recording(parts, robot, joint_prefix)
-
-
-def refuse_topics(
-    path: Path,
-    chains: Sequence[Chain] | Described,
-    topics: Sequence[str],
-    bags: Collection[object],
-) -> None:
-    """Refuse what only bags have, if there are no bags."""
-    option = OPTION if isinstance(chains, Described) else '--joint-topic'
-    if not bags and (topics or option == OPTION):
-        raise LegFKError(f'{option}: {path} has no topics')
 
 
 def follow(
@@ -425,17 +415,3 @@ def _refuse_separate_spans(parts: Sequence[Part]) -> None:
             f'begins at {start / SECOND:.3f} s, and {earliest.path} ends at {end / SECOND:.3f} s; '
             'allowed: parts of one time',
         )
-
-
-def _share_of(
-    place: int, shares: list[float], progress: Progress | None
-) -> Progress | None:
-    """Return what takes the share of one part that is done, and tells that of all."""
-    if progress is None:
-        return None
-
-    def show(share: float) -> None:
-        shares[place] = share
-        progress(sum(shares) / len(shares))
-
-    return show

@@ -77,13 +77,22 @@ class ChainTrack:
         """Return the row nearest to a time [s]."""
         return int(np.abs(self.times - time).argmin())
 
+    def positions_at(self, time: float) -> Array:
+        """Return the (n,) joint positions nearest to a time [rad or m]."""
+        return np.asarray(self.positions[self.nearest(time)])
+
+    def points_at(self, time: float) -> Array:
+        """Return the (K, 3) places of the chain's frames nearest to a time [m]."""
+        return self.chain.frames(self.positions_at(time))[:, :3, 3]
+
     def covers(self, time: float) -> bool:
         """Return whether there are poses around a time [s], rather than before or after alone."""
         is_in_gap = any(begin < time < end for begin, end in self.gaps)
         return bool(self.times.min() <= time <= self.times.max()) and not is_in_gap
 
-    def path_around(self, row: int, seconds: float) -> Array:
-        """Return the (K, 3) places of the tip around a row, as far as there is no break."""
+    def path_around(self, time: float, seconds: float) -> Array:
+        """Return the (K, 3) places of the tip around a time, as far as there is no break."""
+        row = self.nearest(time)
         runs = np.searchsorted(self.breaks, np.arange(len(self.times)), side='right')
         is_near = np.abs(self.times - self.times[row]) <= seconds
         return self.poses[is_near & (runs == runs[row]), :3]

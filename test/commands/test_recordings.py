@@ -54,15 +54,12 @@ def written(names, times, positions=POSITIONS, delimiter=',', number=repr):
     return '\n'.join(lines) + '\n'
 
 
-def seconds(decimals=2):
-    return [f'{time:.{decimals}f}' for time in TIMES]
+SECONDS = [f'{time:.2f}' for time in TIMES]
 
 
-def units_since_1970(per_second):
-    return [
-        str(round((SINCE_1970 + time) * 1000) * per_second // 1000)
-        for time in TIMES.tolist()
-    ]
+def since_1970(per_second):
+    ms = [round((SINCE_1970 + time) * 1000) for time in TIMES.tolist()]
+    return [str(time * per_second // 1000) for time in ms]
 
 
 def decimal_comma(value):
@@ -76,22 +73,22 @@ PLOTJUGGLER = [
     for name in (f'/joint_states/{joint}/position', f'/joint_states/{joint}/velocity')
 ]
 DIALECTS = {
-    'plain.csv': written(('time', *JOINTS), seconds()),
+    'plain.csv': written(('time', *JOINTS), SECONDS),
     'commas.csv': written(
         ('time', *JOINTS),
-        [time.replace('.', ',') for time in seconds()],
+        [time.replace('.', ',') for time in SECONDS],
         delimiter=';',
         number=decimal_comma,
     ),
-    'tabs.tsv': written(('Time', *JOINTS), seconds(), delimiter='\t'),
-    'numpy.txt': '# ' + written(('t', *JOINTS), seconds(), delimiter=' '),
-    'blanks.txt': written(('time', *JOINTS), seconds(), delimiter='   '),
-    'windows.csv': written(('time', *JOINTS), seconds()).encode('utf-16'),
+    'tabs.tsv': written(('Time', *JOINTS), SECONDS, delimiter='\t'),
+    'numpy.txt': '# ' + written(('t', *JOINTS), SECONDS, delimiter=' '),
+    'blanks.txt': written(('time', *JOINTS), SECONDS, delimiter='   '),
+    'windows.csv': written(('time', *JOINTS), SECONDS).encode('utf-16'),
     'excel.csv': b'\xef\xbb\xbf'
     + (
         'sep=;\r\n'
         + written(
-            ('time', *JOINTS), seconds(), delimiter=';', number=decimal_comma
+            ('time', *JOINTS), SECONDS, delimiter=';', number=decimal_comma
         ).replace('\n', '\r\n')
     ).encode(),
     'plotjuggler.csv': written(
@@ -99,9 +96,9 @@ DIALECTS = {
         [f'{SINCE_1970 + time:.6f}' for time in TIMES],
         np.repeat(POSITIONS, 2, axis=1) * ([1, -9] * 6),
     ),
-    'nanoseconds.csv': written(('timestamp', *JOINTS), units_since_1970(1_000_000_000)),
-    'microseconds.csv': written(('timestamp', *JOINTS), units_since_1970(1_000_000)),
-    'milliseconds.csv': written(('stamp', *JOINTS), units_since_1970(1000)),
+    'nanoseconds.csv': written(('timestamp', *JOINTS), since_1970(1_000_000_000)),
+    'microseconds.csv': written(('timestamp', *JOINTS), since_1970(1_000_000)),
+    'milliseconds.csv': written(('stamp', *JOINTS), since_1970(1000)),
     'floats.csv': written(
         ('time', *JOINTS),
         [
@@ -109,9 +106,7 @@ DIALECTS = {
             for time in TIMES.tolist()
         ],
     ),
-    'units.csv': written(
-        ('time [s]', *(f'{name} [rad]' for name in JOINTS)), seconds()
-    ),
+    'units.csv': written(('time [s]', *(f'{name} [rad]' for name in JOINTS)), SECONDS),
     'degrees.csv': written(
         ('time_ms', *(f'{name} [deg]' for name in JOINTS)),
         [f'{1000 * time:.0f}' for time in TIMES],
@@ -120,7 +115,7 @@ DIALECTS = {
     'words.csv': '\n'
     + written(
         ('"note"', '"time"', *(f'joint_states.position.{name}' for name in JOINTS)),
-        [f'"a, b",{time}' for time in seconds()],
+        [f'"a, b",{time}' for time in SECONDS],
     ),
 }
 
@@ -142,25 +137,21 @@ def test_every_dialect_of_csv_is_the_same_recording(name):
 
 
 def test_times_since_1970_are_kept_to_the_nanosecond():
-    stamp = 1_700_000_000_123_456_789
-    Path('a.csv').write_text(
-        written(('time', *JOINTS), [f'{stamp // 10**9}.{stamp % 10**9}'])
-    )
-    Path('b.csv').write_text(written(('timestamp', *JOINTS), [str(stamp)]))
-    for name in ('a.csv', 'b.csv'):
-        done = run_main('poses', name, '--chains', 'left_leg')
-        assert done.stdout.splitlines()[1].startswith('1700000000.123456789,')
-    Path('c.csv').write_text(written(('time', *JOINTS), ['-0.5', '0.5']))
-    rows = run_main('poses', 'c.csv', '--chains', 'left_leg').stdout.splitlines()
-    assert rows[1].startswith('-0.500000000,')
+    for name, time, shown in (
+        ('time', '1700000000.123456789', '1700000000.123456789,'),
+        ('timestamp', '1700000000123456789', '1700000000.123456789,'),
+        ('time', '-0.5', '-0.500000000,'),
+    ):
+        Path('a.csv').write_text(written((name, *JOINTS), [time]))
+        done = run_main('poses', 'a.csv', '--chains', 'left_leg')
+        assert done.stdout.splitlines()[1].startswith(shown)
 
 
 @pytest.mark.parametrize('gap', ['', 'NaN', 'null'])
 def test_empty_cells_and_nan_are_gaps(gap):
-    text = written(('time', *JOINTS), seconds())
-    lines = text.splitlines()
-    lines[6] = ','.join([*lines[6].split(',')[:4], gap, '0', '0'])
-    lines[11] = ','.join([lines[11].split(',')[0], *[gap] * 6])
+    lines = written(('time', *JOINTS), SECONDS).splitlines()
+    lines[6] = f'0.10,0,0,0,{gap},0,0'
+    lines[11] = ','.join(['0.20', *[gap] * 6])
     Path('gaps.csv').write_text('\n'.join(lines))
     table, errors = poses('gaps.csv', '--chains', 'left_leg')
     keep = [row for row in range(COUNT) if row not in (5, 10)]
@@ -169,12 +160,12 @@ def test_empty_cells_and_nan_are_gaps(gap):
 
 
 def test_legs_in_rows_of_their_own_are_no_gaps():
-    rows = []
+    none = [''] * 6
+    rows = [['time', *JOINTS, *RIGHT.joint_names]]
     for time, q in zip(TIMES.tolist(), POSITIONS):
-        rows.append([time, *q, *[''] * 6])
-        rows.append([time + 0.001, *[''] * 6, *q])
+        rows += [[time, *q, *none], [time + 0.001, *none, *q]]
     with open('legs.csv', 'w', newline='') as stream:
-        csv.writer(stream).writerows([['time', *JOINTS, *RIGHT.joint_names], *rows])
+        csv.writer(stream).writerows(rows)
     table, errors = poses('legs.csv')
     assert errors == ''
     assert np.isnan(table['right_foot_x'][::2]).all()
@@ -194,7 +185,7 @@ def test_times_in_an_unlikely_unit_are_warned_of():
 
 
 def test_a_recording_of_one_leg_says_how_to_leave_the_other_out():
-    Path('left.csv').write_text(written(('time', *JOINTS), seconds()))
+    Path('left.csv').write_text(written(('time', *JOINTS), SECONDS))
     table, errors = poses('left.csv')
     assert_poses_of(table, LEFT, POSITIONS)
     assert np.isnan(table['right_foot_x']).all()
@@ -205,42 +196,35 @@ def test_a_recording_of_one_leg_says_how_to_leave_the_other_out():
     assert '--chains left_leg leaves it out' in errors
 
 
-@pytest.mark.parametrize(
-    ('header', 'row', 'words'),
-    [
-        (
-            'time,l_knee',
-            '0,0',
-            'column l_hip_pitch, l_hip_roll, l_hip_yaw, l_ankle_pitch',
-        ),
-        ('time,arm', '0,0', 'column l_hip_pitch'),
-        (
-            'a,b',
-            '0,0',
-            'no column of times in the header (a, b); allowed: time, timestamp',
-        ),
-        ('time,time,l_knee', '0,0,0', 'column time appears twice'),
-        (
-            'time,'
-            + ','.join([*JOINTS, '/a/l_knee/position', '/b/l_knee/position']).replace(
-                'l_knee,', '', 1
-            ),
-            '0,' * 7 + '0',
-            'column /a/l_knee/position and /b/l_knee/position',
-        ),
-        ('time,' + ','.join(JOINTS), '9e18,' + '0,' * 5 + '0', 'times before 2038'),
-        (
-            'time,' + ','.join(JOINTS),
-            '0,' + '1_0,' * 5 + '0',
-            "column l_hip_pitch: '1_0'",
-        ),
-    ],
-)
-def test_what_is_wrong_with_a_csv_file_is_one_line(header, row, words):
-    Path('bad.csv').write_text(f'{header}\n{row}\n')
-    assert_one_line_complaint(
-        run_main('poses', 'bad.csv', '--chains', 'left_leg'), words
-    )
+HEADER = ','.join(('time', *JOINTS))
+ROW = '0,0,0,0,0,0,0'
+CSV_FAULTS = {  # lines of a file, and what is said of them
+    '': 'bad.csv:1: no header',
+    HEADER: 'no rows; allowed: at least one',
+    'time,l_knee\n0,0': 'bad.csv:1: column l_hip_pitch, l_hip_roll, l_hip_yaw, l_ankle_p',
+    'time,arm\n0,0': 'column l_hip_pitch',
+    'a,b\n0,0': 'bad.csv:1: no column of times in the header (a, b); allowed: time, timest',
+    'time,time,l_knee\n0,0,0': 'column time appears twice',
+    f'{HEADER},l_knee\n{ROW},0': 'bad.csv:1: column l_knee appears twice',
+    f'{HEADER.replace("l_knee", "/a/l_knee/position,/b/l_knee/position")}\n{ROW},0': (
+        'column /a/l_knee/position and /b/l_knee/position'
+    ),
+    f'{HEADER}\n9e18,0,0,0,0,0,0': 'times before 2038',
+    f'{HEADER}\n0,1_0,0,0,0,0,0': "column l_hip_pitch: '1_0'",
+    f'{HEADER}\n{ROW}\n1,0,0,soon,0,0,0': "bad.csv:3: column l_hip_yaw: 'soon'",
+    f'{HEADER}\n{ROW}\nnan,0,0,0,0,0,0': "bad.csv:3: column time: 'nan'",
+    f'{HEADER}\n0,0': 'bad.csv:2: 2 values under 7 columns',
+    f'{HEADER}\n{ROW},1': 'bad.csv:2: 8 values under 7 columns',
+    f'{HEADER}\n0,1e300,0,0,0,0,0': "l_hip_pitch: '1e300'; allowed: a finite number up to",
+    '\xff\xfe\x00\x01' * 99: 'no column of times',
+}
+
+
+@pytest.mark.parametrize('text', CSV_FAULTS)
+def test_what_is_wrong_with_a_csv_file_is_one_line(text):
+    Path('bad.csv').write_text(text, encoding='latin-1')
+    done = run_main('poses', 'bad.csv', '--chains', 'left_leg')
+    assert_one_line_complaint(done, CSV_FAULTS[text])
 
 
 def write_log(part, joints, clocks='tx', port='state', times=TIMES, name=None):
@@ -304,17 +288,11 @@ def test_parts_that_do_not_go_together_are_refused_by_name():
     write_log('right_leg', POSITIONS, times=TIMES + 100)
     write_log('left_arm', POSITIONS)
     for paths, words in (
-        (
-            ['left_leg', 'again'],
-            'again: brings joint l_hip_pitch, and so does left_leg',
-        ),
-        (
-            ['left_leg', 'right_leg'],
-            'right_leg: begins at 1700000100.000 s, and left_leg',
-        ),
-        (['left_arm'], '/icub/left_arm/state:o is of no known part; allowed: left_leg'),
+        ('left_leg again', 'again: brings joint l_hip_pitch, and so does left_leg'),
+        ('left_leg right_leg', 'right_leg: begins at 1700000100.000 s, and left_leg'),
+        ('left_arm', '/icub/left_arm/state:o is of no known part; allowed: left_leg'),
     ):
-        assert_one_line_complaint(run_main('poses', *paths), words)
+        assert_one_line_complaint(run_main('poses', *paths.split()), words)
 
 
 @pytest.mark.parametrize(
@@ -342,22 +320,16 @@ def test_the_last_line_of_a_log_may_still_be_written():
     assert_poses_of(table, LEFT, POSITIONS)
 
 
-@pytest.mark.parametrize(
-    ('name', 'words'),
-    [
-        (
-            'robot.mat',
-            'is a file of MATLAB, as robometry writes it; save it as a CSV file',
-        ),
+def test_other_files_are_refused_with_what_is_allowed():
+    for name, words in (
+        ('a.mat', 'is a file of MATLAB, as robometry writes it; save it as a CSV file'),
         ('robot.urdf', 'is no recording by its name; allowed: a bag'),
         ('nothing', 'there is no such file or directory; allowed: a bag'),
-    ],
-)
-def test_other_files_are_refused_with_what_is_allowed(name, words):
-    if name != 'nothing':
-        Path(name).write_text('text')
-    for command in (('poses', name), ('plot', name), ('bag', name, 'out')):
-        assert_one_line_complaint(run_main(*command), words)
+    ):
+        if name != 'nothing':
+            Path(name).write_text('text')
+        for command in (('poses', name), ('plot', name), ('bag', name, 'out')):
+            assert_one_line_complaint(run_main(*command), words)
 
 
 def test_joint_states_are_serialized_as_ros_does():
@@ -368,47 +340,45 @@ def test_joint_states_are_serialized_as_ros_does():
     assert ours == bag_files.joint_state(stamp, names, [1.0, 2.0, 3.0, 4.0])
 
 
-def two_topics(bag_files, path='bag'):
+def two_topics():
     """Write a bag with a topic of joint states for each leg, and one for another robot's arm."""
+    bag_files = pytest.importorskip('support.bag_files')
     topics = {}
-    for leg, chain in (('left', LEFT), ('right', RIGHT), ('arm', None)):
-        names = chain.joint_names if chain else ('arm',)
-        rows = [
-            (round((SINCE_1970 + time) * 1e9), q) for time, q in zip(TIMES, POSITIONS)
-        ]
-        topics[f'/icub1/{leg}/joint_states'] = (
-            bag_files.JOINT_STATE,
-            [],
-            [
-                (stamp, bag_files.joint_state(stamp, names, q[: len(names)]))
-                for stamp, q in rows
-            ],
-        )
-    return bag_files.write_topics(Path(path), topics)
+    for part, names in (
+        ('left', JOINTS),
+        ('right', RIGHT.joint_names),
+        ('arm', ('arm',)),
+    ):
+        messages = []
+        for time, q in zip(TIMES, POSITIONS):
+            stamp = round((SINCE_1970 + time) * 1e9)
+            data = bag_files.joint_state(stamp, names, q[: len(names)])
+            messages.append((stamp, data))
+        topics[f'/icub1/{part}/joint_states'] = (bag_files.JOINT_STATE, [], messages)
+    return bag_files.write_topics('bag', topics)
 
 
 def test_several_topics_of_a_bag_are_one_robot():
-    bag_files = pytest.importorskip('support.bag_files')
-    bag = two_topics(bag_files)
-    topics = ['/icub1/left/joint_states', '/icub1/right/joint_states']
-    table, errors = poses(bag, '--joint-topic', *topics)
+    bag = two_topics()
+    topics = ('--joint-topic', '/icub1/left/joint_states', '/icub1/right/joint_states')
+    table, errors = poses(bag, *topics)
     assert errors == ''
     assert len(table['time']) == COUNT  # messages of one time are one row
     for chain in (LEFT, RIGHT):
         assert_poses_of(table, chain, POSITIONS)
-    done = run_main('bag', bag, 'out', '--joint-topic', *topics)
-    assert f'{COUNT}  added on /icub1/foot_pose_publisher/left_foot/pose' in done.stdout
-    done = run_main('bag', bag, 'other', '--joint-topic', *topics, '--namespace', 'a/b')
-    assert f'{COUNT}  added on /a/b/foot_pose_publisher/right_foot/pose' in done.stdout
+    for words, namespace in (((), '/icub1'), (('--namespace', 'a/b'), '/a/b')):
+        done = run_main('bag', bag, 'out', *topics, *words, '--force')
+        for tip in ('left_foot', 'right_foot'):
+            added = f'{COUNT}  added on {namespace}/foot_pose_publisher/{tip}/pose'
+            assert added in done.stdout
     assert_one_line_complaint(
-        run_main('bag', bag, 'none', '--joint-topic', *topics, '--namespace', '1 2'),
+        run_main('bag', bag, 'none', *topics, '--namespace', '1 2'),
         "--namespace: found '1 2'",
     )
 
 
 def test_errors_name_the_topics_that_have_the_joints():
-    bag_files = pytest.importorskip('support.bag_files')
-    bag = two_topics(bag_files)
+    bag = two_topics()
     has = (
         '--joint-topic can be /icub1/left/joint_states, /icub1/right/joint_states (which has '
         'joints of these chains), /icub1/arm/joint_states'
@@ -419,9 +389,9 @@ def test_errors_name_the_topics_that_have_the_joints():
         )
     done = run_main('poses', bag, '--joint-topic', '/icub1/arm/joint_states')
     assert_one_line_complaint(done, '--joint-topic can be /icub1/left/joint_states')
-    done = run_main('poses', bag, '--joint-topic', '/icub1/left/joint_states')
-    assert 'right_leg has no pose' in done.stderr
-    assert '--joint-topic can be /icub1/right/joint_states' in done.stderr
+    _, errors = poses(bag, '--joint-topic', '/icub1/left/joint_states')
+    assert 'right_leg has no pose' in errors
+    assert '--joint-topic can be /icub1/right/joint_states' in errors
     Path('walk.csv').write_text(DIALECTS['plain.csv'])
     done = run_main('poses', 'walk.csv', '--joint-topic', '/a')
     assert_one_line_complaint(done, '--joint-topic: walk.csv has no topics')
@@ -431,13 +401,11 @@ def test_bag_makes_a_bag_of_any_recording():
     bag_files = pytest.importorskip('support.bag_files')
     Path('walk.csv').write_text(DIALECTS['nanoseconds.csv'])
     write_log('left_leg', POSITIONS)
+    left = ('--chains', 'left_leg')
     for source in ('walk.csv', 'left_leg'):
-        done = run_main(
-            'bag', source, f'{source}_bag', '--chains', 'left_leg', '--storage', 'mcap'
-        )
+        done = run_main('bag', source, f'{source}_bag', *left)
         assert f'{COUNT}  messages copied' in done.stdout
         topics, messages = bag_files.read_bag(f'{source}_bag')
         assert topics['/joint_states'][0] == bag_files.JOINT_STATE
         assert len(bag_files.poses_of(messages, bag_files.LEFT_POSE)) == COUNT
-        again, _ = poses(f'{source}_bag', '--chains', 'left_leg')
-        assert_poses_of(again, LEFT, POSITIONS)
+        assert_poses_of(poses(f'{source}_bag', *left)[0], LEFT, POSITIONS)
