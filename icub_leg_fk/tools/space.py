@@ -97,7 +97,7 @@ class Space:
         self._names: list[Box] = []
         self._box = box
         points = np.vstack((points, np.zeros((1, 3))))
-        self.step = step = _round_step(float(np.ptp(points, axis=0).max()) / 7)
+        self.step = step = round_step(float(np.ptp(points, axis=0).max()) / 7)
         lowest = np.floor(points.min(axis=0) / step - 1) * step
         highest = np.ceil(points.max(axis=0) / step + 1) * step
         lowest[2] = points[:, 2].min()
@@ -283,11 +283,8 @@ def _grid(lowest: Array, highest: Array, step: float) -> list[Array]:
     return lines + [np.array([(x0, y, low), (xs[-1], y, low)]) for y in ys]
 
 
-def _round_step(least: float) -> float:
+def round_step(least: float) -> float:
     """Return the smallest of 0.1, 0.2, 0.5, 1 and the like [m] that is not below a length."""
     least = max(least, 1e-4)
     decade = 10.0 ** math.floor(math.log10(least))
-    for factor in (1, 2, 5):
-        if factor * decade >= least:
-            return factor * decade
-    return 10 * decade
+    return next(decade * step for step in (1, 2, 5, 10) if decade * step >= least)

@@ -201,7 +201,7 @@ class Method:
         scene = labels('method/factor', names, ends.mean(axis=1), self._size)
         scene['method/frames'] = axes(self.frames, 0.06 * self._size, 2.0)
         scene['method/tip'] = axes(self._tip[None], 0.16 * self._size, 5.0)
-        scene['method/tip name'] = Label(self._posed.chain.frame_id, self._tip[:3, 3])
+        scene['method/tip name'] = Label(self._tip[:3, 3], self._posed.chain.frame_id)
         is_long = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > _NOTHING
         if is_long.any():
             scene['method/factors'] = arrows(ends[is_long], INK, 3.0, self._size)
@@ -222,7 +222,7 @@ def _length_scene(name: str, length: float, ends: Array, color: str) -> Scene:
     words = f'{name} = {short(1000 * length)}'
     return {
         f'method/{name}': polyline(ends, color, 7.0),
-        f'method/{name} value': Label(words, ends.mean(axis=0)),
+        f'method/{name} value': Label(ends.mean(axis=0), words),
     }
 
 
@@ -238,5 +238,5 @@ def _angle_scene(
     return {
         f'method/{name}': polyline(points, color, 5.0),
         f'method/{name} sides': polyline(sides, color, 1.5),
-        f'method/{name} value': Label(words, label_place),
+        f'method/{name} value': Label(label_place, words),
     }

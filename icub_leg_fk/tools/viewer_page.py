@@ -16,7 +16,7 @@ from icub_leg_fk.kinematics import Chain, chain_text, DHLink
 from icub_leg_fk.kinematics.rotation import Array, roll_pitch_yaw
 from icub_leg_fk.tools import text
 from icub_leg_fk.tools.signals import held_signals
-from icub_leg_fk.tools.viewer_scene import Dots, Label, Lines, PosedChain, Scene
+from icub_leg_fk.tools.viewer_scene import Label, Lines, Part, PosedChain, Scene
 from icub_leg_fk.tools.viewer_source import Changed
 import numpy as np
 
@@ -98,32 +98,19 @@ class Canvas:
             for name in self._shown.keys() - scene.keys():
                 self._handles.pop(name).remove()
             for name, part in scene.items():
-                if not self._moved(name, part):
+                if _looks_like(self._shown.get(name), part):
+                    setattr(self._handles[name], part._fields[0], part[0])
+                else:
                     self._handles[name] = self._added(name, part)
         self._shown = scene
 
-    def _moved(self, name: str, part: Lines | Dots | Label) -> bool:
-        """Move what is shown under a name, if it differs from a part in its places only."""
-        before = self._shown.get(name)
-        if isinstance(part, Label):
-            if not isinstance(before, Label) or before.text != part.text:
-                return False
-            self._handles[name].position = part.at
-            return True
-        if before is None or isinstance(before, Label):
-            return False
-        if before.points.shape != part.points.shape or _look(before) != _look(part):
-            return False
-        self._handles[name].points = part.points
-        return True
-
-    def _added(self, name: str, part: Lines | Dots | Label) -> Any:
+    def _added(self, name: str, part: Part) -> Any:
         scene = self._server.scene
         if isinstance(part, Label):
             return scene.add_label(
                 name,
                 part.text,
-                position=part.at,
+                position=part.position,
                 font_screen_scale=0.8,
                 anchor='bottom-left',
             )
@@ -148,11 +135,11 @@ class Canvas:
         )
 
 
-def _look(part: Lines | Dots) -> tuple[Any, float]:
-    """Return what distinguishes parts other than their places."""
-    if isinstance(part, Lines):
-        return part.colors, part.width
-    return part.color, part.size
+def _looks_like(before: Part | None, part: Part) -> bool:
+    """Tell whether what is shown differs from a part in its place alone."""
+    if type(before) is not type(part):
+        return False
+    return before[1:] == part[1:] and before[0].shape == part[0].shape
 
 
 def _rgb(color: str) -> tuple[int, int, int]:

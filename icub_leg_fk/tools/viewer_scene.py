@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 import math
+from typing import NamedTuple
 
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.stream.colors import color_of
-from icub_leg_fk.tools.space import AXIS_COLORS
+from icub_leg_fk.tools.space import AXIS_COLORS, round_step
 import numpy as np
 
 INK = '#222222'
@@ -31,8 +31,7 @@ _GRID_CELLS = 8  # in each direction
 _HEAD = 0.03  # length of an arrow's head, of the size of the scene
 
 
-@dataclass(frozen=True)
-class Lines:
+class Lines(NamedTuple):
     """Straight lines.
 
     Attributes:
@@ -46,8 +45,7 @@ class Lines:
     width: float
 
 
-@dataclass(frozen=True)
-class Dots:
+class Dots(NamedTuple):
     """Round points.
 
     Attributes:
@@ -61,20 +59,21 @@ class Dots:
     size: float
 
 
-@dataclass(frozen=True)
-class Label:
+class Label(NamedTuple):
     """A text that faces the viewer.
 
     Attributes:
+        position: (3,) place [m].
         text: the text.
-        at: (3,) place [m].
     """
 
+    position: Array
     text: str
-    at: Array
 
 
-Scene = dict[str, Lines | Dots | Label]
+Part = Lines | Dots | Label
+Scene = dict[str, Part]
+"""Parts by their names; the first field of each is where it is, the others are its look."""
 
 
 class PosedChain:
@@ -151,7 +150,7 @@ def labels(
                 break
         else:
             merged.append((name, place))
-    return {f'{prefix} {text}': Label(text, place) for text, place in merged}
+    return {f'{prefix} {text}': Label(place, text) for text, place in merged}
 
 
 def reach(chains: Iterable[Chain]) -> float:
@@ -192,7 +191,7 @@ def root_scene(chain: Chain, size: float) -> Scene:
     aside = np.full(3, -0.02 * size)  # frame 0 may be in the same place
     scene: Scene = {
         'root/axes': axes(np.eye(4)[None], length, 4.0),
-        'root/name': Label(chain.root_frame, aside),
+        'root/name': Label(aside, chain.root_frame),
     }
     return scene | labels(
         'root/axis', axis_names(chain), 1.1 * length * np.eye(3), size
@@ -202,7 +201,7 @@ def root_scene(chain: Chain, size: float) -> Scene:
 def floor_scene(points: Array, root_axes: Sequence[str], size: float) -> Scene:
     """Return a grid below (N, 3) points [m]."""
     forward, left, up = directions(root_axes)
-    step = _round_step(size / 4)
+    step = round_step(size / 8)
     middle = np.array([np.mean(points @ forward), np.mean(points @ left)])
     half = step * _GRID_CELLS / 2
     ends = []
@@ -213,14 +212,6 @@ def floor_scene(points: Array, root_axes: Sequence[str], size: float) -> Scene:
     lowest = float((points @ up).min())
     corners = plane[..., :1] * forward + plane[..., 1:] * left + lowest * up
     return {'floor': segments(corners, GRID, 1.0)}
-
-
-def _round_step(length: float) -> float:
-    """Return the largest of ..., 0.1, 0.2, 0.5, 1, 2, 5, ... that is no longer than a length."""
-    decade = 10.0 ** math.floor(math.log10(length))
-    return max(
-        decade * step for step in (1, 2, 5) if decade * step <= length * (1 + 1e-9)
-    )
 
 
 def skeleton_scene(posed: PosedChain, size: float) -> Scene:

@@ -22,7 +22,6 @@ from icub_leg_fk.tools.viewer import PERIOD, Viewer
 from icub_leg_fk.tools.viewer_live import following, LiveRobot
 from icub_leg_fk.tools.viewer_method import arc, LAST_STEP, Method
 from icub_leg_fk.tools.viewer_page import (
-    roll_pitch_yaw,
     running_server,
     slider_bounds,
     slider_start,
@@ -491,25 +490,6 @@ def test_a_slider_goes_a_fifth_beyond_its_range(lower, upper, joint_type):
         assert low == pytest.approx((lower - margin) * unit, abs=rounding)
         assert high == pytest.approx((upper + margin) * unit, abs=rounding)
     assert low <= slider_start(link) <= high
-
-
-@given(st.floats(-3.1, 3.1), st.floats(-1.57, 1.57), st.floats(-3.1, 3.1))
-def test_angles_turn_back_into_the_rotation(roll, pitch, yaw):
-    R = rotation(roll, pitch, yaw)
-    np.testing.assert_allclose(roll_pitch_yaw(R), [roll, pitch, yaw], atol=1e-6)
-
-
-@pytest.mark.parametrize('pitch', [-math.pi / 2, math.pi / 2])
-def test_angles_have_no_yaw_where_any_would_do(pitch):
-    R = rotation(0.4, pitch, 0.7)
-    roll, _, yaw = roll_pitch_yaw(R)
-    assert yaw == 0.0
-    np.testing.assert_allclose(rotation(roll, pitch, yaw), R, atol=1e-12)
-
-
-def rotation(roll, pitch, yaw):
-    x, y, z = np.eye(3)
-    return turns_about(z, yaw) @ turns_about(y, pitch) @ turns_about(x, roll)
 
 
 def test_the_newest_sample_is_shown_and_how_old_it_is():
