@@ -179,6 +179,12 @@ def axis_names(chain: Chain) -> list[str]:
     return [f'{axis} {word}'.strip() for axis, word in zip('xyz', words, strict=True)]
 
 
+def root_words(chain: Chain) -> str:
+    """Return a chain's root: `root_link (x backward, y right, z up)`."""
+    where = f' ({", ".join(axis_names(chain))})' if chain.root_axes else ''
+    return f'{chain.root_frame}{where}'
+
+
 def outer_points(posed: PosedChain) -> Array:
     """Return (N, 3) points between which a chain is, from the root to its tip and sole."""
     points = np.vstack((np.zeros((1, 3)), posed.origins))
