@@ -17,7 +17,8 @@ from icub_leg_fk.tools.explanation import explain
 from icub_leg_fk.tools.explanation_text import as_text
 from icub_leg_fk.tools.space import AXIS_COLORS
 from icub_leg_fk.tools.viewer_scene import (
-    arrows,
+    ARROW,
+    Arrows,
     axes,
     DOT,
     Dots,
@@ -133,8 +134,8 @@ class Method:
         names = [f'{letter}_{i}' for i in range(len(self.frames))]
         scene = labels(f'method/{letter}', names, origins + 1.1 * along, self._size)
         ends = np.stack((origins, origins + along), axis=1)
-        scene[f'method/{letter} axes'] = arrows(
-            ends, AXIS_COLORS[column], 3.0, self._size
+        scene[f'method/{letter} axes'] = Arrows(
+            ends, AXIS_COLORS[column], ARROW * self._size
         )
         if letter == 'z':
             lines = np.stack((origins - along, origins), axis=1)
@@ -204,7 +205,7 @@ class Method:
         scene['method/tip name'] = Label(self._tip[:3, 3], self._posed.chain.frame_id)
         is_long = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > _NOTHING
         if is_long.any():
-            scene['method/factors'] = arrows(ends[is_long], INK, 3.0, self._size)
+            scene['method/factors'] = Arrows(ends[is_long], INK, ARROW * self._size)
         return scene
 
 

@@ -15,7 +15,7 @@ import numpy as np
 INK = '#222222'
 FAINT = '#9a9a9a'
 GRID = '#d4d4d4'
-DOT = 0.01  # of the size of the scene
+ARROW, DOT = 0.004, 0.01  # of the size of the scene
 
 _DIRECTIONS = {
     'forward': (1, 0, 0),
@@ -28,7 +28,6 @@ _DIRECTIONS = {
 _UNKNOWN_ROOT = ('forward', 'left', 'up')  # REP-103
 _SAME_PLACE = 1e-6  # of the size of the scene; nearer labels become one
 _GRID_CELLS = 8  # in each direction
-_HEAD = 0.03  # length of an arrow's head, of the size of the scene
 
 
 class Lines(NamedTuple):
@@ -43,6 +42,20 @@ class Lines(NamedTuple):
     points: Array
     colors: tuple[str, ...]
     width: float
+
+
+class Arrows(NamedTuple):
+    """Straight arrows.
+
+    Attributes:
+        points: (N, 2, 3) where they begin and end [m].
+        color: `#rrggbb`.
+        radius: of their shafts [m].
+    """
+
+    points: Array
+    color: str
+    radius: float
 
 
 class Dots(NamedTuple):
@@ -71,7 +84,7 @@ class Label(NamedTuple):
     text: str
 
 
-Part = Lines | Dots | Label
+Part = Lines | Arrows | Dots | Label
 Scene = dict[str, Part]
 """Parts by their names; the first field of each is where it is, the others are its look."""
 
@@ -111,23 +124,6 @@ def segments(ends: Array, color: str, width: float) -> Lines:
 def polyline(points: Array, color: str, width: float) -> Lines:
     """Return the lines from each of (N, 3) points to the next."""
     return segments(np.stack((points[:-1], points[1:]), axis=1), color, width)
-
-
-def arrows(ends: Array, color: str, width: float, size: float) -> Lines:
-    """Return arrows from (N, 2, 3) starts to tips, with heads of four lines each."""
-    tips = ends[:, 1]
-    lengths = np.linalg.norm(tips - ends[:, 0], axis=1, keepdims=True)
-    along = (tips - ends[:, 0]) / lengths
-    head = np.minimum(_HEAD * size, 0.4 * lengths)
-    least = np.eye(3)[np.abs(along).argmin(axis=1)]
-    side = np.cross(along, least)
-    side /= np.linalg.norm(side, axis=1, keepdims=True)
-    other = np.cross(along, side)
-    strokes = [ends]
-    for outward in (side, -side, other, -other):
-        back = tips + head * (0.35 * outward - along)
-        strokes.append(np.stack((tips, back), axis=1))
-    return segments(np.concatenate(strokes), color, width)
 
 
 def axes(frames: Array, length: float, width: float) -> Lines:
