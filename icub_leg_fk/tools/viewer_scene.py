@@ -7,6 +7,7 @@ import math
 from typing import NamedTuple
 
 from icub_leg_fk.kinematics import Chain
+from icub_leg_fk.kinematics.kinematics_file import DIRECTIONS
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.stream.colors import color_of
 from icub_leg_fk.tools.space import AXIS_COLORS, round_step
@@ -17,14 +18,6 @@ FAINT = '#9a9a9a'
 GRID = '#d4d4d4'
 ARROW, DOT = 0.004, 0.01  # of the size of the scene
 
-_DIRECTIONS = {
-    'forward': (1, 0, 0),
-    'backward': (-1, 0, 0),
-    'left': (0, 1, 0),
-    'right': (0, -1, 0),
-    'up': (0, 0, 1),
-    'down': (0, 0, -1),
-}
 _UNKNOWN_ROOT = ('forward', 'left', 'up')  # REP-103
 _SAME_PLACE = 1e-6  # of the size of the scene; nearer labels become one
 _GRID_CELLS = 8  # in each direction
@@ -164,7 +157,7 @@ def reach(chains: Iterable[Chain]) -> float:
 def directions(root_axes: Sequence[str]) -> tuple[Array, Array, Array]:
     """Return where forward, left and up are in the root frame, (3,) each."""
     words = root_axes or _UNKNOWN_ROOT
-    R = np.array([_DIRECTIONS[word] for word in words], dtype=float)
+    R = np.array([DIRECTIONS[word] for word in words], dtype=float)
     forward, left, up = R.T
     return forward, left, up
 
