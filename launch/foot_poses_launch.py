@@ -34,20 +34,31 @@ SIM_TIME = Parameter(
     'use_sim_time', False, 'Take the time from /clock.', 'true or false'
 )
 AS_PARAMETERS = (*PARAMETERS, SIM_TIME)
-OTHERS = {  # default and meaning
-    'joint_states': ('joint_states', 'Topic of the joint states.'),
-    'params_file': (
+ARGUMENTS = (
+    *AS_PARAMETERS,
+    Parameter('joint_states', 'joint_states', 'Topic of the joint states.', 'a topic'),
+    Parameter(
+        'params_file',
         '',
         'YAML file with node parameters; an argument given here wins over it.',
+        'a file',
     ),
-    'namespace': ('', 'Namespace of the node and of its topics.'),
-    'log_level': ('info', 'What the node logs: debug, info, warn, error or fatal.'),
-    'rviz': (
-        'false',
+    Parameter('namespace', '', 'Namespace of the node and its topics.', 'a namespace'),
+    Parameter(
+        'log_level',
+        'info',
+        'What the node logs.',
+        'debug, info, warn, error or fatal',
+    ),
+    Parameter(
+        'rviz',
+        False,
         'Open RViz with the poses and the skeletons, for which publish_markers is '
         'then true unless given.',
+        'true or false',
     ),
-}
+)
+NAMES = [argument.name for argument in ARGUMENTS]
 TRUTH = {'true': True, '1': True, 'false': False, '0': False, '': False}
 
 
@@ -73,26 +84,17 @@ class Unset(Substitution):
 
 def generate_launch_description() -> LaunchDescription:
     """Describe the arguments, all of them optional, and the nodes."""
-    arguments = []
-    for parameter in AS_PARAMETERS:
-        description = f'{parameter.description} Allowed: {parameter.allowed}.'
-        arguments.append(
+    declared = []
+    for argument in ARGUMENTS:
+        description = f'{argument.description} Allowed: {argument.allowed}.'
+        default = Unset(written(argument.default))
+        declared.append(
             DeclareLaunchArgument(
-                parameter.name,
-                default_value=Unset(written(parameter.default)),
-                description=description,
-            )
-        )
-    for name, (default, description) in OTHERS.items():
-        arguments.append(
-            DeclareLaunchArgument(
-                name, default_value=Unset(default), description=description
+                argument.name, default_value=default, description=description
             )
         )
     # In a group of its own nothing that is declared here is left behind for other launch files.
-    return LaunchDescription(
-        [GroupAction([*arguments, OpaqueFunction(function=nodes)])]
-    )
+    return LaunchDescription([GroupAction([*declared, OpaqueFunction(function=nodes)])])
 
 
 def written(value: Any) -> str:
@@ -105,15 +107,12 @@ def written(value: Any) -> str:
 def nodes(context: LaunchContext) -> list[Node]:
     """Return the node, its parameters from the file and then from the arguments; and RViz."""
     refuse_misspelt(sys.argv)
-    given = {}
-    for name in (*(parameter.name for parameter in AS_PARAMETERS), *OTHERS):
-        given[name] = context.launch_configurations[name]
+    given = {name: context.launch_configurations[name] for name in NAMES}
     parameters: dict[str, ParameterValue] = {}
     for parameter in AS_PARAMETERS:
-        if given[parameter.name]:
-            parameters[parameter.name] = parameter_value(
-                parameter, given[parameter.name], context
-            )
+        found = given[parameter.name]
+        if found:
+            parameters[parameter.name] = parameter_value(parameter, found, context)
     params_file = checked_file(given['params_file'])
     with_rviz = truth('rviz', given['rviz'])
     if with_rviz:
@@ -198,11 +197,10 @@ def refuse_misspelt(argv: Sequence[str]) -> None:
     """
     if Path(__file__).name not in [Path(word).name for word in argv]:
         return
-    ours = [*(parameter.name for parameter in AS_PARAMETERS), *OTHERS]
     for word in argv:
         name, assigns, _ = word.partition(':=')
-        if assigns and name not in ours and closest(name, ours):
-            raise RuntimeError(str(UnknownNameError('argument', name, ours)))
+        if assigns and name not in NAMES and closest(name, NAMES):
+            raise RuntimeError(str(UnknownNameError('argument', name, NAMES)))
 
 
 def parameter_value(

@@ -10,7 +10,7 @@ import sys
 from typing import Any
 
 from icub_leg_fk.commands.plot import default_instants
-from icub_leg_fk.kinematics import Catalog, Chain, config_file
+from icub_leg_fk.kinematics import Chain, config_file
 from icub_leg_fk.stream.configuration import LEGS
 from icub_leg_fk.tools import options, text
 from icub_leg_fk.tools import recording as recordings
@@ -69,6 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         parser,
         'picture to write, .png, .svg or .pdf (default: demo.png, which is replaced)',
     )
+    parser.set_defaults(chains=LEGS)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -79,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
     if args.save:
         import_rosbags()
         check_target(args.save, force=args.force, may_replace=is_bag)
-    chains = _legs(options.load_catalog(args), args)
+    chains = options.chains_of_one_root(args)
     recording = _recording(args, chains)
     try:
         replay, is_whole = _play(recording, chains, args.kinematics_file)
@@ -103,13 +104,6 @@ def run(args: argparse.Namespace) -> int:
         recordings.write_joint_states(args.save, replay.sent, force=args.force)
         print(f'bag           {args.save}', flush=True)
     return status
-
-
-def _legs(catalog: Catalog, args: argparse.Namespace) -> list[Chain]:
-    chains = catalog.select(LEGS, args.version)
-    if args.foot_frame is None:
-        return list(chains)
-    return [chain.with_frame(args.foot_frame) for chain in chains]
 
 
 def _recording(args: argparse.Namespace, chains: Sequence[Chain]) -> JointRecording:

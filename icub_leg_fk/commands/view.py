@@ -18,7 +18,7 @@ from icub_leg_fk.tools.viewer import Viewer
 from icub_leg_fk.tools.viewer_live import following, LiveRobot
 from icub_leg_fk.tools.viewer_page import running_server
 from icub_leg_fk.tools.viewer_recording import Recording
-from icub_leg_fk.tools.viewer_scene import axis_names
+from icub_leg_fk.tools.viewer_scene import root_words
 from icub_leg_fk.tools.viewer_source import Source
 
 EXAMPLES = """\
@@ -162,11 +162,8 @@ def _announce(chains: Sequence[Chain], args: argparse.Namespace, port: int) -> N
         host = '127.0.0.1'
     address = f'http://{host}:{port}/'
     names = ', '.join(f'{chain.name}={chain.version}' for chain in chains)
-    root = chains[0]
-    where = f' ({", ".join(axis_names(root))})' if root.root_axes else ''
-    print(
-        f'{names} in {root.root_frame}{where}\n{address}   (Ctrl-C ends it)', flush=True
-    )
+    print(f'{names} in {root_words(chains[0])}')
+    print(f'{address}   (Ctrl-C ends it)', flush=True)
     if not args.no_browser and _has_display():
         webbrowser.open(address)
 

@@ -16,7 +16,7 @@ import numpy as np
 
 _LENGTHS = ('mm', 'm')
 _ANGLES = ('deg', 'rad')
-_DIRECTIONS = {
+DIRECTIONS = {
     'forward': (1, 0, 0),
     'backward': (-1, 0, 0),
     'left': (0, 1, 0),
@@ -187,9 +187,9 @@ class _FileReader:
     def _root_axes(self, at: Field) -> tuple[str, ...]:
         """Return where x, y and z of the root point."""
         words = tuple(
-            item.choice(tuple(_DIRECTIONS)) for item in at.items('three directions', 3)
+            item.choice(tuple(DIRECTIONS)) for item in at.items('three directions', 3)
         )
-        x, y, z = (_DIRECTIONS[word] for word in words)
+        x, y, z = (DIRECTIONS[word] for word in words)
         if not np.array_equal(np.cross(x, y), z):
             at.fail(
                 'directions of x, y, z that make a right-handed frame', ', '.join(words)

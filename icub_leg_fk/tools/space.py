@@ -39,25 +39,28 @@ class Box(NamedTuple):
     width: float
     height: float
 
+    @property
+    def right(self) -> float:
+        """Its right side."""
+        return self.left + self.width
+
+    @property
+    def top(self) -> float:
+        """Its upper side."""
+        return self.bottom + self.height
+
     def meets(self, other: Box) -> bool:
         """Return whether two rectangles have a part in common."""
-        is_beside = (
-            self.left >= other.left + other.width
-            or other.left >= self.left + self.width
-        )
-        is_above = (
-            self.bottom >= other.bottom + other.height
-            or other.bottom >= self.bottom + self.height
-        )
-        return not is_beside and not is_above
+        left, bottom = max(self.left, other.left), max(self.bottom, other.bottom)
+        return left < min(self.right, other.right) and bottom < min(self.top, other.top)
 
     def holds(self, other: Box) -> bool:
         """Return whether another rectangle is inside."""
         return (
             self.left <= other.left
             and self.bottom <= other.bottom
-            and other.left + other.width <= self.left + self.width
-            and other.bottom + other.height <= self.bottom + self.height
+            and other.right <= self.right
+            and other.top <= self.top
         )
 
 
@@ -97,7 +100,7 @@ class Space:
         self._names: list[Box] = []
         self._box = box
         points = np.vstack((points, np.zeros((1, 3))))
-        self.step = step = _round_step(float(np.ptp(points, axis=0).max()) / 7)
+        self.step = step = round_step(float(np.ptp(points, axis=0).max()) / 7)
         lowest = np.floor(points.min(axis=0) / step - 1) * step
         highest = np.ceil(points.max(axis=0) / step + 1) * step
         lowest[2] = points[:, 2].min()
@@ -137,9 +140,10 @@ class Space:
     ) -> None:
         """Draw the axes of a (4, 4) frame, the nearest last, and the names that find room."""
         for i in sorted(range(3), key=lambda i: self.depth(T[:3, i])):
-            axis = length * T[:3, i]
-            self._arrow(T[:3, 3], axis, AXIS_COLORS[i], width, zorder)
-            self._name(T[:3, 3], axis, labels[i], size, AXIS_COLORS[i], zorder)
+            start, end = self._seen([T[:3, 3], T[:3, 3] + length * T[:3, i]])
+            self._arrow(start, end, AXIS_COLORS[i], width, zorder)
+            side = (end - start)[0] / length
+            self._name(start, end, side, labels[i], size, AXIS_COLORS[i], zorder)
 
     def chain(
         self, chain: Chain, q: ArrayLike, zorder: float, alpha: float = 1.0
@@ -213,13 +217,12 @@ class Space:
             self.line(line, color=GRID, linewidth=1, zorder=1)
 
     def _arrow(
-        self, origin: Array, axis: Array, color: str, width: float, zorder: float
+        self, start: Array, end: Array, color: str, width: float, zorder: float
     ) -> None:
-        start, end = self._seen([origin, origin + axis])
+        """Draw an arrow between two places in the picture; a short one has no head."""
         if np.linalg.norm(end - start) * self._scale < _LEAST_ARROW:
-            self.line(
-                [origin, origin + axis], color=color, linewidth=width, zorder=zorder
-            )
+            u, v = np.stack((start, end), axis=1)
+            self.axes.plot(u, v, color=color, linewidth=width, zorder=zorder)
             return
         style = {
             'arrowstyle': '-|>',
@@ -235,22 +238,23 @@ class Space:
 
     def _name(
         self,
-        origin: Array,
-        axis: Array,
+        start: Array,
+        end: Array,
+        side: float,
         name: str,
         size: float,
         color: str,
         zorder: float,
     ) -> None:
-        """Write the name of an axis after its end, where nothing else is written."""
+        """Write the name of an axis after its end, where nothing else is written.
+
+        It leads to the right by `side` of its length.
+        """
         width = 0.7 * size * len(name) * _POINT
         height = 1.3 * size * _POINT
-        side = float((axis / np.linalg.norm(axis) @ self._projection)[0])
-        place = 'center'
+        place, share = 'center', 0.5
         if abs(side) >= 0.3:
-            place = 'left' if side > 0 else 'right'
-        share = {'center': 0.5, 'left': 0.0, 'right': 1.0}[place]
-        start, end = self._seen([origin, origin + axis])
+            place, share = ('left', 0.0) if side > 0 else ('right', 1.0)
         length = float(np.linalg.norm(end - start))
         direction = (end - start) / length if length else np.array([0.0, 1.0])
         for distance in _DISTANCES:
@@ -283,11 +287,8 @@ def _grid(lowest: Array, highest: Array, step: float) -> list[Array]:
     return lines + [np.array([(x0, y, low), (xs[-1], y, low)]) for y in ys]
 
 
-def _round_step(least: float) -> float:
+def round_step(least: float) -> float:
     """Return the smallest of 0.1, 0.2, 0.5, 1 and the like [m] that is not below a length."""
     least = max(least, 1e-4)
     decade = 10.0 ** math.floor(math.log10(least))
-    for factor in (1, 2, 5):
-        if factor * decade >= least:
-            return factor * decade
-    return 10 * decade
+    return next(decade * step for step in (1, 2, 5, 10) if decade * step >= least)

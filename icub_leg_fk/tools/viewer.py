@@ -146,9 +146,7 @@ class Viewer:
         self._names = [f'{chain.name}={chain.version}' for chain in self._chains]
         panel = gui.add_panel()
         with panel.add_tab('Poses'):
-            root = self._chains[0]
-            where = f': {", ".join(drawn.axis_names(root))}' if root.root_axes else ''
-            gui.add_markdown(f'poses in `{root.root_frame}`{where}')
+            gui.add_markdown(f'poses in {drawn.root_words(self._chains[0])}')
             self._frames = gui.add_checkbox('frames of the table', True)
             self._tips = []
             for chain in self._chains:

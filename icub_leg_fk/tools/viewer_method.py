@@ -17,7 +17,8 @@ from icub_leg_fk.tools.explanation import explain
 from icub_leg_fk.tools.explanation_text import as_text
 from icub_leg_fk.tools.space import AXIS_COLORS
 from icub_leg_fk.tools.viewer_scene import (
-    arrows,
+    ARROW,
+    Arrows,
     axes,
     DOT,
     Dots,
@@ -133,8 +134,8 @@ class Method:
         names = [f'{letter}_{i}' for i in range(len(self.frames))]
         scene = labels(f'method/{letter}', names, origins + 1.1 * along, self._size)
         ends = np.stack((origins, origins + along), axis=1)
-        scene[f'method/{letter} axes'] = arrows(
-            ends, AXIS_COLORS[column], 3.0, self._size
+        scene[f'method/{letter} axes'] = Arrows(
+            ends, AXIS_COLORS[column], ARROW * self._size
         )
         if letter == 'z':
             lines = np.stack((origins - along, origins), axis=1)
@@ -177,15 +178,12 @@ class Method:
         scene |= _length_scene(f'd_{row}', geometry.d, geometry.d_ends, _Z_COLOR)
         scene |= _length_scene(f'a_{row}', geometry.a, geometry.a_ends, _X_COLOR)
         # Both angles are drawn in the frame's origin from which, or to which, their axis leads.
-        first_x, first_z = (
-            0.1 * self._size * pair[0, :3, 0],
-            0.1 * self._size * pair[0, :3, 2],
-        )
-        x_origin, z_origin = pair[1, :3, 3], pair[0, :3, 3]
+        z_origin, x_origin = pair[:, :3, 3]
         if self._explanation.is_modified:
             x_origin, z_origin = z_origin, x_origin
-        theta = arc(z_origin, geometry.z, first_x, geometry.theta)
-        alpha = arc(x_origin, geometry.x, first_z, geometry.alpha)
+        radius = 0.1 * self._size
+        theta = arc(z_origin, geometry.z, radius * pair[0, :3, 0], geometry.theta)
+        alpha = arc(x_origin, geometry.x, radius * pair[0, :3, 2], geometry.alpha)
         scene |= _angle_scene(f'theta_{row}', geometry.theta, z_origin, theta, _Z_COLOR)
         return scene | _angle_scene(
             f'alpha_{row}', geometry.alpha, x_origin, alpha, _X_COLOR
@@ -194,17 +192,16 @@ class Method:
     def _product_scene(self) -> Scene:
         """Return the way from frame to frame, and the tip's frame to which it leads."""
         places = np.vstack((np.zeros(3), self.frames[:, :3, 3], self._tip[:3, 3]))
-        ends = np.stack((places[:-1], places[1:]), axis=1)
-        names = ['T_Ro0', *(f'A_{i}' for i in range(len(self._rows))), 'T_n_tip']
-        if np.allclose(self._tip, self.frames[-1], rtol=0.0, atol=1e-12):
-            ends, names = ends[:-1], names[:-1]
+        names = ['T_Ro0', *(f'A_{i}' for i in range(len(self._rows)))]
+        names += filter(None, [' '.join(self._explanation.tips)])
+        ends = np.stack((places[:-1], places[1:]), axis=1)[: len(names)]
         scene = labels('method/factor', names, ends.mean(axis=1), self._size)
         scene['method/frames'] = axes(self.frames, 0.06 * self._size, 2.0)
         scene['method/tip'] = axes(self._tip[None], 0.16 * self._size, 5.0)
-        scene['method/tip name'] = Label(self._posed.chain.frame_id, self._tip[:3, 3])
+        scene['method/tip name'] = Label(self._tip[:3, 3], self._posed.chain.frame_id)
         is_long = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > _NOTHING
         if is_long.any():
-            scene['method/factors'] = arrows(ends[is_long], INK, 3.0, self._size)
+            scene['method/factors'] = Arrows(ends[is_long], INK, ARROW * self._size)
         return scene
 
 
@@ -222,7 +219,7 @@ def _length_scene(name: str, length: float, ends: Array, color: str) -> Scene:
     words = f'{name} = {short(1000 * length)}'
     return {
         f'method/{name}': polyline(ends, color, 7.0),
-        f'method/{name} value': Label(words, ends.mean(axis=0)),
+        f'method/{name} value': Label(ends.mean(axis=0), words),
     }
 
 
@@ -238,5 +235,5 @@ def _angle_scene(
     return {
         f'method/{name}': polyline(points, color, 5.0),
         f'method/{name} sides': polyline(sides, color, 1.5),
-        f'method/{name} value': Label(words, label_place),
+        f'method/{name} value': Label(label_place, words),
     }

@@ -9,28 +9,43 @@ from importlib import import_module
 import io
 import math
 import socket
-from typing import Any
+from typing import Any, NamedTuple
 
 from icub_leg_fk.errors import LegFKError, MissingDependencyError
 from icub_leg_fk.kinematics import Chain, chain_text, DHLink
 from icub_leg_fk.kinematics.rotation import Array, roll_pitch_yaw
 from icub_leg_fk.tools import text
 from icub_leg_fk.tools.signals import held_signals
-from icub_leg_fk.tools.viewer_scene import Dots, Label, Lines, PosedChain, Scene
+from icub_leg_fk.tools.viewer_scene import Arrows, Label, Lines, Part, PosedChain, Scene
 from icub_leg_fk.tools.viewer_source import Changed
 import numpy as np
 
 _BEYOND = 0.2  # of a range; so far beyond it a slider goes
-_BOUNDS = {
-    'revolute': (-180.0, 180.0),
-    'prismatic': (-1.0, 1.0),
-}  # deg or m, without a range
-_STEP = {'revolute': 0.1, 'prismatic': 0.001}  # deg or m
-_ROUND = {
-    'revolute': 1.0,
-    'prismatic': 0.01,
-}  # deg or m; a slider's ends are multiples of it
 _ROUNDING = 1e-9  # rad or m; from degrees and back
+
+
+class _Scale(NamedTuple):
+    """How a slider shows the positions of a joint.
+
+    Attributes:
+        unit: its unit, in words.
+        per: how many of these a rad or m is.
+        most: end of a slider without a range.
+        step: step of a slider.
+        whole: a slider's ends are multiples of it.
+    """
+
+    unit: str
+    per: float
+    most: float
+    step: float
+    whole: float
+
+
+_SCALES = {
+    'revolute': _Scale('degrees', 180.0 / math.pi, 180.0, 0.1, 1.0),
+    'prismatic': _Scale('m', 1.0, 1.0, 0.001, 0.01),
+}
 
 _GREY, _RED = '#777777', '#d00000'
 _SMALL = 'font-size:11px;line-height:1.2;padding:0 8px'
@@ -98,32 +113,19 @@ class Canvas:
             for name in self._shown.keys() - scene.keys():
                 self._handles.pop(name).remove()
             for name, part in scene.items():
-                if not self._moved(name, part):
+                if _looks_like(self._shown.get(name), part):
+                    setattr(self._handles[name], part._fields[0], part[0])
+                else:
                     self._handles[name] = self._added(name, part)
         self._shown = scene
 
-    def _moved(self, name: str, part: Lines | Dots | Label) -> bool:
-        """Move what is shown under a name, if it differs from a part in its places only."""
-        before = self._shown.get(name)
-        if isinstance(part, Label):
-            if not isinstance(before, Label) or before.text != part.text:
-                return False
-            self._handles[name].position = part.at
-            return True
-        if before is None or isinstance(before, Label):
-            return False
-        if before.points.shape != part.points.shape or _look(before) != _look(part):
-            return False
-        self._handles[name].points = part.points
-        return True
-
-    def _added(self, name: str, part: Lines | Dots | Label) -> Any:
+    def _added(self, name: str, part: Part) -> Any:
         scene = self._server.scene
         if isinstance(part, Label):
             return scene.add_label(
                 name,
                 part.text,
-                position=part.at,
+                position=part.position,
                 font_screen_scale=0.8,
                 anchor='bottom-left',
             )
@@ -137,6 +139,15 @@ class Canvas:
                 thickness=part.width,
                 thickness_units='screen',
             )
+        if isinstance(part, Arrows):
+            return scene.add_arrows(
+                name,
+                part.points,
+                _rgb(part.color),
+                shaft_radius=part.radius,
+                head_radius=3 * part.radius,
+                head_length=8 * part.radius,
+            )
         return scene.add_point_cloud(
             name,
             part.points,
@@ -148,11 +159,11 @@ class Canvas:
         )
 
 
-def _look(part: Lines | Dots) -> tuple[Any, float]:
-    """Return what distinguishes parts other than their places."""
-    if isinstance(part, Lines):
-        return part.colors, part.width
-    return part.color, part.size
+def _looks_like(before: Part | None, part: Part) -> bool:
+    """Tell whether what is shown differs from a part in its place alone."""
+    if type(before) is not type(part):
+        return False
+    return before[1:] == part[1:] and before[0].shape == part[0].shape
 
 
 def _rgb(color: str) -> tuple[int, int, int]:
@@ -196,26 +207,26 @@ class JointSliders:
 
     def _add(self, name: str, link: DHLink) -> None:
         low, high = slider_bounds(link)
-        unit = 'm' if link.is_prismatic else 'degrees'
+        scale = _SCALES[link.joint_type]
         self._links[name] = link
         self._sliders[name] = self._gui.add_slider(
             name,
             low,
             high,
-            _STEP[link.joint_type],
+            scale.step,
             slider_start(link),
             disabled=self._follow,
-            hint=f'{name} in {unit}',
+            hint=f'{name} in {scale.unit}',
         )
         self._lines[name] = self._gui.add_html('')
 
     def positions(self, chain: Chain) -> list[float]:
         """Return the joint positions of a chain [rad or m] at which its sliders stand."""
-        return [self._position(name) for name in chain.joint_names]
-
-    def _position(self, name: str) -> float:
-        value = float(self._sliders[name].value)
-        return value if self._links[name].is_prismatic else math.radians(value)
+        positions = []
+        for name in chain.joint_names:
+            scale = _SCALES[self._links[name].joint_type]
+            positions.append(float(self._sliders[name].value) / scale.per)
+        return positions
 
     def show(self, positions: Mapping[str, float]) -> None:
         """Say whether joint positions [rad or m] are in range; sliders that follow move there.
@@ -226,7 +237,7 @@ class JointSliders:
             link, slider = self._links[name], self._sliders[name]
             self._lines[name].content = _range_line(link, position)
             if self._follow:
-                shown = position if link.is_prismatic else math.degrees(position)
+                shown = _SCALES[link.joint_type].per * position
                 slider.value = min(max(shown, slider.min), slider.max)
 
     def reset(self) -> None:
@@ -238,14 +249,15 @@ class JointSliders:
 def slider_bounds(link: DHLink) -> tuple[float, float]:
     """Return the ends of a joint's slider [deg or m]: a fifth of its range beyond either end."""
     lower, upper = _shown_limits(link)
-    least, most = _BOUNDS[link.joint_type]
+    scale = _SCALES[link.joint_type]
     if not math.isfinite(lower):
-        lower = min(least, upper + least)
+        lower = min(-scale.most, upper - scale.most)
     if not math.isfinite(upper):
-        upper = max(most, lower + most)
-    margin, unit = _BEYOND * (upper - lower), _ROUND[link.joint_type]
-    low, high = math.floor((lower - margin) / unit), math.ceil((upper + margin) / unit)
-    return round(unit * low, 2), round(unit * high, 2)
+        upper = max(scale.most, lower + scale.most)
+    margin, whole = _BEYOND * (upper - lower), scale.whole
+    low = whole * math.floor((lower - margin) / whole)
+    high = whole * math.ceil((upper + margin) / whole)
+    return round(low, 2), round(high, 2)
 
 
 def slider_start(link: DHLink) -> float:
@@ -257,9 +269,8 @@ def slider_start(link: DHLink) -> float:
 def _shown_limits(link: DHLink) -> tuple[float, float]:
     """Return the ends of a joint's range [deg or m]."""
     lower, upper = link.limits
-    if link.is_prismatic:
-        return lower, upper
-    return math.degrees(lower), math.degrees(upper)
+    per = _SCALES[link.joint_type].per
+    return per * lower, per * upper
 
 
 def _range_line(link: DHLink, position: float) -> str:

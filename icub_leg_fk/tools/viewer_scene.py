@@ -3,36 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 import math
+from typing import NamedTuple
 
 from icub_leg_fk.kinematics import Chain
+from icub_leg_fk.kinematics.kinematics_file import DIRECTIONS
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.stream.colors import color_of
-from icub_leg_fk.tools.space import AXIS_COLORS
+from icub_leg_fk.tools.space import AXIS_COLORS, round_step
 import numpy as np
 
 INK = '#222222'
 FAINT = '#9a9a9a'
 GRID = '#d4d4d4'
-DOT = 0.01  # of the size of the scene
+ARROW, DOT = 0.004, 0.01  # of the size of the scene
 
-_DIRECTIONS = {
-    'forward': (1, 0, 0),
-    'backward': (-1, 0, 0),
-    'left': (0, 1, 0),
-    'right': (0, -1, 0),
-    'up': (0, 0, 1),
-    'down': (0, 0, -1),
-}
 _UNKNOWN_ROOT = ('forward', 'left', 'up')  # REP-103
 _SAME_PLACE = 1e-6  # of the size of the scene; nearer labels become one
 _GRID_CELLS = 8  # in each direction
-_HEAD = 0.03  # length of an arrow's head, of the size of the scene
 
 
-@dataclass(frozen=True)
-class Lines:
+class Lines(NamedTuple):
     """Straight lines.
 
     Attributes:
@@ -46,8 +37,21 @@ class Lines:
     width: float
 
 
-@dataclass(frozen=True)
-class Dots:
+class Arrows(NamedTuple):
+    """Straight arrows.
+
+    Attributes:
+        points: (N, 2, 3) where they begin and end [m].
+        color: `#rrggbb`.
+        radius: of their shafts [m].
+    """
+
+    points: Array
+    color: str
+    radius: float
+
+
+class Dots(NamedTuple):
     """Round points.
 
     Attributes:
@@ -61,20 +65,21 @@ class Dots:
     size: float
 
 
-@dataclass(frozen=True)
-class Label:
+class Label(NamedTuple):
     """A text that faces the viewer.
 
     Attributes:
+        position: (3,) place [m].
         text: the text.
-        at: (3,) place [m].
     """
 
+    position: Array
     text: str
-    at: Array
 
 
-Scene = dict[str, Lines | Dots | Label]
+Part = Lines | Arrows | Dots | Label
+Scene = dict[str, Part]
+"""Parts by their names; the first field of each is where it is, the others are its look."""
 
 
 class PosedChain:
@@ -114,23 +119,6 @@ def polyline(points: Array, color: str, width: float) -> Lines:
     return segments(np.stack((points[:-1], points[1:]), axis=1), color, width)
 
 
-def arrows(ends: Array, color: str, width: float, size: float) -> Lines:
-    """Return arrows from (N, 2, 3) starts to tips, with heads of four lines each."""
-    tips = ends[:, 1]
-    lengths = np.linalg.norm(tips - ends[:, 0], axis=1, keepdims=True)
-    along = (tips - ends[:, 0]) / lengths
-    head = np.minimum(_HEAD * size, 0.4 * lengths)
-    least = np.eye(3)[np.abs(along).argmin(axis=1)]
-    side = np.cross(along, least)
-    side /= np.linalg.norm(side, axis=1, keepdims=True)
-    other = np.cross(along, side)
-    strokes = [ends]
-    for outward in (side, -side, other, -other):
-        back = tips + head * (0.35 * outward - along)
-        strokes.append(np.stack((tips, back), axis=1))
-    return segments(np.concatenate(strokes), color, width)
-
-
 def axes(frames: Array, length: float, width: float) -> Lines:
     """Return the x, y and z axes of (N, 4, 4) frames: red, green, blue."""
     origins = np.repeat(frames[:, None, :3, 3], 3, axis=1)
@@ -151,7 +139,7 @@ def labels(
                 break
         else:
             merged.append((name, place))
-    return {f'{prefix} {text}': Label(text, place) for text, place in merged}
+    return {f'{prefix} {text}': Label(place, text) for text, place in merged}
 
 
 def reach(chains: Iterable[Chain]) -> float:
@@ -169,7 +157,7 @@ def reach(chains: Iterable[Chain]) -> float:
 def directions(root_axes: Sequence[str]) -> tuple[Array, Array, Array]:
     """Return where forward, left and up are in the root frame, (3,) each."""
     words = root_axes or _UNKNOWN_ROOT
-    R = np.array([_DIRECTIONS[word] for word in words], dtype=float)
+    R = np.array([DIRECTIONS[word] for word in words], dtype=float)
     forward, left, up = R.T
     return forward, left, up
 
@@ -178,6 +166,12 @@ def axis_names(chain: Chain) -> list[str]:
     """Return the axes of a chain's root with where they point: `x backward`, `y right`, `z up`."""
     words = chain.root_axes or ('', '', '')
     return [f'{axis} {word}'.strip() for axis, word in zip('xyz', words, strict=True)]
+
+
+def root_words(chain: Chain) -> str:
+    """Return a chain's root: `root_link (x backward, y right, z up)`."""
+    where = f' ({", ".join(axis_names(chain))})' if chain.root_axes else ''
+    return f'{chain.root_frame}{where}'
 
 
 def outer_points(posed: PosedChain) -> Array:
@@ -192,7 +186,7 @@ def root_scene(chain: Chain, size: float) -> Scene:
     aside = np.full(3, -0.02 * size)  # frame 0 may be in the same place
     scene: Scene = {
         'root/axes': axes(np.eye(4)[None], length, 4.0),
-        'root/name': Label(chain.root_frame, aside),
+        'root/name': Label(aside, chain.root_frame),
     }
     return scene | labels(
         'root/axis', axis_names(chain), 1.1 * length * np.eye(3), size
@@ -202,7 +196,7 @@ def root_scene(chain: Chain, size: float) -> Scene:
 def floor_scene(points: Array, root_axes: Sequence[str], size: float) -> Scene:
     """Return a grid below (N, 3) points [m]."""
     forward, left, up = directions(root_axes)
-    step = _round_step(size / 4)
+    step = round_step(size / 8)
     middle = np.array([np.mean(points @ forward), np.mean(points @ left)])
     half = step * _GRID_CELLS / 2
     ends = []
@@ -213,14 +207,6 @@ def floor_scene(points: Array, root_axes: Sequence[str], size: float) -> Scene:
     lowest = float((points @ up).min())
     corners = plane[..., :1] * forward + plane[..., 1:] * left + lowest * up
     return {'floor': segments(corners, GRID, 1.0)}
-
-
-def _round_step(length: float) -> float:
-    """Return the largest of ..., 0.1, 0.2, 0.5, 1, 2, 5, ... that is no longer than a length."""
-    decade = 10.0 ** math.floor(math.log10(length))
-    return max(
-        decade * step for step in (1, 2, 5) if decade * step <= length * (1 + 1e-9)
-    )
 
 
 def skeleton_scene(posed: PosedChain, size: float) -> Scene:

@@ -34,10 +34,8 @@ JOINTS = [name for chain in CHAINS for name in chain.joint_names]
 
 @pytest.fixture(autouse=True)
 def own_directory(tmp_path, monkeypatch):
-    path = [str(Path(__file__).parents[2]), os.environ.get('PYTHONPATH', '')]
-    monkeypatch.setenv(
-        'PYTHONPATH', os.pathsep.join(filter(None, path))
-    )  # for the processes
+    clone = str(Path(__file__).parents[2])  # for the processes
+    monkeypatch.setenv('PYTHONPATH', clone, prepend=os.pathsep)
     monkeypatch.chdir(tmp_path)
 
 
@@ -197,29 +195,26 @@ def test_node_that_refuses_its_parameters_is_one_line():
         wait_until(check)
 
 
-def test_node_that_dies_is_one_line_and_exit_1():
-    process = start('--seconds', '60')
-    (node,) = wait_until(lambda: children(process.pid))
-    read_until(process.stdout, 'right foot: x')
-    os.kill(node, signal.SIGKILL)
-    _, err = process.communicate(timeout=90)
-    assert process.returncode == 1
-    assert err.count('\n') == 1
-    assert 'the node stopped with exit status -9' in err
-
-
 @pytest.mark.parametrize(
-    ('number', 'early'), [(signal.SIGINT, False), (signal.SIGTERM, True)]
+    ('victim', 'number', 'early', 'status', 'complaint'),
+    [
+        ('demo', signal.SIGINT, False, 130, ''),
+        ('demo', signal.SIGTERM, True, 143, ''),
+        ('node', signal.SIGKILL, False, 1, 'the node stopped with exit status -9'),
+    ],
 )
-def test_signals_leave_no_process_and_no_file_behind(number, early):
+def test_an_early_end_leaves_no_process_and_no_file_behind(
+    victim, number, early, status, complaint
+):
     process = start('--seconds', '60', '--save', 'walk')
     (node,) = wait_until(lambda: children(process.pid))
     if not early:
         read_until(process.stdout, 'right foot: x')
-    process.send_signal(number)
+    os.kill({'demo': process.pid, 'node': node}[victim], number)
     out, err = process.communicate(timeout=90)
-    assert (process.returncode, err) == (128 + number, '')
-    is_summed_up = number == signal.SIGINT and not early
+    assert (process.returncode, err.count('\n')) == (status, bool(complaint))
+    assert complaint in err
+    is_summed_up = number == signal.SIGINT
     assert ('messages in' in out and 'interrupted' in out) == is_summed_up
     wait_until(lambda: not runs(node))
     assert not list(Path().iterdir())

@@ -9,6 +9,7 @@ from icub_leg_fk.kinematics.rotation import (
     cos_sin,
     is_rigid_transform,
     nearest_rotation,
+    roll_pitch_yaw,
 )
 import numpy as np
 import pytest
@@ -102,3 +103,25 @@ def test_a_rounded_rotation_is_corrected_and_an_exact_one_is_untouched() -> None
     assert np.abs(corrected @ corrected.T - np.eye(3)).max() < 10 * EPS
     exact = np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]])
     assert nearest_rotation(exact) is exact
+
+
+def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
+    """Rz(yaw) Ry(pitch) Rx(roll), as the URDF specification defines rpy."""
+    x, y, z = np.eye(3)
+    return rodrigues(z, yaw) @ rodrigues(y, pitch) @ rodrigues(x, roll)
+
+
+@pytest.mark.parametrize('sign', [1.0, -1.0])
+@pytest.mark.parametrize(
+    'nudge', [0, 1e-16, 1e-12, 1e-9, 1e-8, 1e-7, 1e-5, 1e-3, 0.5, 1.5]
+)
+def test_roll_pitch_yaw_turn_back_into_the_rotation(nudge: float, sign: float) -> None:
+    pitch = sign * (math.pi / 2 - nudge)
+    for roll, yaw in np.random.default_rng(3).uniform(-math.pi, math.pi, (50, 2)):
+        R = rotation(roll, pitch, yaw)
+        angles = roll_pitch_yaw(R)
+        assert np.abs(rotation(*angles) - R).max() < 4e-15
+        if nudge == 0:
+            assert angles[2] == 0.0  # where any yaw would do
+        if nudge >= 1e-3:
+            np.testing.assert_allclose(angles, [roll, pitch, yaw], atol=1e-6)

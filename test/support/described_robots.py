@@ -23,7 +23,7 @@ def own_description(version, *chains):
 @cache
 def _model(text):
     pin = pytest.importorskip('pinocchio', reason='Pinocchio is not installed')
-    model = pin.buildModelFromXML(text)
+    model = pin.buildModelFromXML(text, mimic=True)
     return pin, model, model.createData()
 
 
@@ -32,7 +32,10 @@ def pinocchio_pose(text, root, tip, positions):
     pin, model, data = _model(text)
     q = pin.neutral(model)
     for name, value in positions.items():
-        q[model.joints[model.getJointId(name)].idx_q] = value
+        joint = model.joints[model.getJointId(name)]
+        # A joint without limits is a point on the circle there.
+        turned = [np.cos(value), np.sin(value)] if joint.nq == 2 else value
+        q[joint.idx_q : joint.idx_q + joint.nq] = turned
     pin.framesForwardKinematics(model, data, q)
     T_root, T_tip = [
         data.oMf[model.getFrameId(link, pin.FrameType.BODY)] for link in (root, tip)
