@@ -188,8 +188,8 @@ def _compare_all(
     if not found:
         raise InputFileError(
             robot.urdf.file,
-            f'{"; ".join(not_compared)}; -k takes tables with the names of this robot, as '
-            'leg_fk table makes them, and --root the link that is its root',
+            f'{"; ".join(not_compared)}; --root names another root link, and -k tables with '
+            'the names of this robot, as leg_fk table makes them',
         )
     return found, not_compared
 

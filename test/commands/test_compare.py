@@ -174,7 +174,7 @@ def test_a_robot_without_the_joints_says_what_it_has(tmp_path: Path) -> None:
     file.write_text(robot([joint(0, 'continuous')]))
     assert_one_line_complaint(
         run_main('compare', file),
-        'left_leg, right_leg, head_imu: not compared: the robot has no link root_link; -k ',
+        'left_leg, right_leg, head_imu: not compared: the robot has no link root_link; --root ',
     )
     assert_one_line_complaint(
         run_main('compare', file, '--chains', 'left_lag'), "did you mean 'left_leg'?"

@@ -165,7 +165,7 @@ ANSWERS_ON_FILES = [
     ('table arm.urdf', "has none of the iCub's chains; give --tips, such as l2"),
     ('table arm.urdf --tips l9', "unknown chain 'l9'"),
     ('compare arm.yaml', 'is a kinematics file; allowed here: a URDF'),
-    ('compare arm.urdf', '-k takes tables with the names of this robot'),
+    ('compare arm.urdf', '-k tables with the names of this robot'),
     ('compare arm.urdf --chains left_leg=v9', "unknown version 'v9' of chain left_leg"),
     ('compare arm.urdf --chains l_sole', 'l_sole is the sole frame of left_leg'),
 ]
