@@ -91,7 +91,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the comparison."""
     catalog, urdf = options.load_catalog(args), Urdf.load(args.urdf)
-    if args.robot_root:
+    if args.robot_root is not None:
         urdf.check_link(args.robot_root)
     robot = _Robot(urdf, args.robot_root)
     found, not_compared = _compare_all(catalog, args.chains or catalog.chains, robot)

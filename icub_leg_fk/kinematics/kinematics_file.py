@@ -11,7 +11,14 @@ from icub_leg_fk.kinematics.chain import Chain, TipFrame
 from icub_leg_fk.kinematics.frozen import Frozen
 from icub_leg_fk.kinematics.link import CONVENTIONS, DHLink, JOINT_TYPES, standard_rows
 from icub_leg_fk.kinematics.rotation import Array, is_rigid_transform, nearest_rotation
-from icub_leg_fk.kinematics.yaml_fields import Field, FRAME_ID, read_yaml, Record, WORD
+from icub_leg_fk.kinematics.yaml_fields import (
+    Field,
+    FRAME_ID,
+    LINE,
+    read_yaml,
+    Record,
+    WORD,
+)
 import numpy as np
 
 _LENGTHS = ('mm', 'm')
@@ -91,6 +98,7 @@ class _FileReader:
         self.warnings: list[str] = []
         self._length = self._angle = self._default = ''
         self._rows_read = 0
+        self._owners: dict[str, str] = {}  # of the tips
 
     def chains(self, path: str | Path) -> tuple[str, dict[str, ChainEntry]]:
         root = read_yaml(path)
@@ -99,11 +107,10 @@ class _FileReader:
         self._length = units['length'].choice(_LENGTHS)
         self._angle = units['angle'].choice(_ANGLES)
         self._default = top.given('default_version', '', Field.name, 'a version')
-        chains = top['chains'].mapping('chains by name', lambda name: f'chain {name}')
-        if not chains:
-            top['chains'].fail('at least one chain', 'none')
+        chains = top['chains'].mapping(
+            'chains by name', lambda name: f'chain {name}', at_least_one='chain'
+        )
         entries = {name: self._entry(name, at) for name, at in chains.items()}
-        self._check_tips(entries, chains)
         versions = {version for entry in entries.values() for version in entry.versions}
         if self._default and self._default not in versions:
             known = ', '.join(sorted(versions))
@@ -115,21 +122,20 @@ class _FileReader:
             ('tip', *_PLACE, 'versions'), ('root_axes', 'default_version')
         )
         tip = fields['tip'].name('a name', WORD)
-        versions = self._versions(name, tip, fields)
+        owner = self._owners.setdefault(tip, name)
+        if owner != name:
+            fields['tip'].fail(
+                'another tip for each chain', f'{tip}, the tip of chain {owner}'
+            )
+        named = fields['versions'].mapping(
+            'versions by name',
+            lambda version: f'chain {name}, version {version}',
+            at_least_one='version',
+        )
+        versions = {}
+        for version, version_at in named.items():
+            versions[version] = self._version(name, tip, version, version_at, fields)
         return ChainEntry(name, tip, versions, self._default_version(versions, fields))
-
-    def _check_tips(
-        self, entries: Mapping[str, ChainEntry], chains: Mapping[str, Field]
-    ) -> None:
-        owners: dict[str, str] = {}
-        for name, entry in entries.items():
-            owner = owners.setdefault(entry.tip, name)
-            if owner != name:
-                tip = chains[name].at('field tip')
-                tip.fail(
-                    'another tip for each chain',
-                    f'{entry.tip}, the tip of chain {owner}',
-                )
 
     def _default_version(self, versions: Mapping[str, Chain], chain: Record) -> str:
         """Return the chain's own default, or the file's, or the only version; else nothing."""
@@ -137,17 +143,6 @@ class _FileReader:
         if own or self._default in versions:
             return own or self._default
         return next(iter(versions)) if len(versions) == 1 else ''
-
-    def _versions(self, name: str, tip: str, chain: Record) -> dict[str, Chain]:
-        versions = chain['versions'].mapping(
-            'versions by name', lambda version: f'chain {name}, version {version}'
-        )
-        if not versions:
-            chain['versions'].fail('at least one version', 'none')
-        return {
-            version: self._version(name, tip, version, at, chain)
-            for version, at in versions.items()
-        }
 
     def _version(
         self, name: str, tip: str, version: str, at: Field, chain: Record
@@ -172,7 +167,7 @@ class _FileReader:
             T_n_tip=own.given('T_nIs', np.eye(4), self._transform),
             convention=convention,
             root_axes=place.given('root_axes', (), self._root_axes),
-            source=own.given('source', '', Field.text),
+            source=own.given('source', '', Field.name, '', LINE),
         )
 
     def _joint_names(self, at: Field) -> tuple[str, ...]:
@@ -199,7 +194,10 @@ class _FileReader:
     def _tip_frames(self, at: Field, root_frame: str) -> dict[str, TipFrame]:
         frames = {}
         named = at.mapping(
-            'tip frames by name', lambda name: f'{at.where}, {name}', WORD
+            'tip frames by name',
+            lambda name: f'{at.where}, {name}',
+            WORD,
+            at_least_one='tip frame',
         )
         for name, value in named.items():
             fields = value.record(('frame',), ('transform', 'outline'))
@@ -211,8 +209,6 @@ class _FileReader:
                 fields.given('transform', np.eye(4), self._transform),
                 fields.given('outline', None, self._outline),
             )
-        if not frames:
-            at.fail('at least one tip frame', 'none')
         return frames
 
     def _outline(self, at: Field) -> Array:
@@ -274,7 +270,7 @@ class _FileReader:
             lower=lower,
             upper=upper,
             robot_range=fields.given('robot_range', None, self._range, slides),
-            erratum=fields.given('erratum', '', Field.text),
+            erratum=fields.given('erratum', '', Field.name, '', LINE),
         )
 
     def _gain(self, at: Field) -> float:

@@ -77,9 +77,7 @@ class UrdfChains(Mapping[str, ChainEntry]):
         if frames:
             chain = self._known_chain(name, frames)
         elif name in self._urdf.links:
-            chain = chain_from_urdf(
-                self._urdf, self._root, name, tolerance=self._tolerance
-            )
+            chain = self._chain(name)
         else:
             raise KeyError(name)
         return ChainEntry(name, chain.tip, {VERSION: chain}, VERSION)
@@ -87,28 +85,20 @@ class UrdfChains(Mapping[str, ChainEntry]):
     def _known_chain(self, name: str, frames: Mapping[str, TipFrame]) -> Chain:
         """Return a known chain with the robot's own geometry."""
         first = next(iter(frames.values()))
-        chain = chain_from_urdf(
-            self._urdf, self._root, first.frame_id, tolerance=self._tolerance
-        )
-        at_zero = {
-            frame: self._urdf.forward(self._root, tip_frame.frame_id, {})[0]
-            for frame, tip_frame in frames.items()
-        }
-        T_tip = np.linalg.inv(at_zero[next(iter(frames))])
+        chain = self._chain(first.frame_id)
         tip_frames = {}
-        for frame, tip_frame in frames.items():
-            T = np.eye(4) if tip_frame is first else T_tip @ at_zero[frame]
+        for name_of_frame, tip_frame in frames.items():
+            T = self._urdf.forward(first.frame_id, tip_frame.frame_id, {})[0]
             expected = np.linalg.inv(first.T_tip_frame) @ tip_frame.T_tip_frame
             is_flat = angle_between(T[:3, :3], expected[:3, :3]) < _SAME_AXES
             outline = tip_frame.outline if is_flat else None
-            tip_frames[frame] = TipFrame(tip_frame.frame_id, T, outline)
+            tip_frames[name_of_frame] = TipFrame(tip_frame.frame_id, T, outline)
         return replace(
-            chain,
-            name=name,
-            tip=self._known[name].tip,
-            tip_frames=tip_frames,
-            frame=next(iter(tip_frames)),
+            chain, name=name, tip=self._known[name].tip, tip_frames=tip_frames, frame=''
         )
+
+    def _chain(self, link: str) -> Chain:
+        return chain_from_urdf(self._urdf, self._root, link, tolerance=self._tolerance)
 
     def _known_frames(self, name: str) -> dict[str, TipFrame]:
         """Return the tip frames of a known chain that the robot has, all on one body."""

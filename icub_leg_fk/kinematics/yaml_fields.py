@@ -91,7 +91,11 @@ class Field:
         return Field(self.file, f'{self.where}, {place}', self.node)
 
     def mapping(
-        self, content: str, where: Callable[[str], str], kind: TextKind = NAME
+        self,
+        content: str,
+        where: Callable[[str], str],
+        kind: TextKind = NAME,
+        at_least_one: str = '',
     ) -> dict[str, Field]:
         """Return the values of a mapping by name, refusing a key that stands twice.
 
@@ -99,6 +103,7 @@ class Field:
             content: what the mapping holds, for the error.
             where: returns the words for the place of a value, given its key.
             kind: what a key looks like.
+            at_least_one: what there must be one of; empty if there need not be.
         """
         if not isinstance(self.node, yaml.MappingNode):
             self.fail(content)
@@ -110,6 +115,8 @@ class Field:
                     'each key once', 'a duplicate key'
                 )
             fields[name] = Field(self.file, where(name), value)
+        if at_least_one and not fields:
+            self.fail(f'at least one {at_least_one}', 'none')
         return fields
 
     def record(
@@ -173,18 +180,11 @@ class Field:
         angle = math.pi * float(factor or 1) / float(divisor or 1)
         return -angle if sign == '-' else angle
 
-    def name(self, what: str, kind: TextKind = NAME) -> str:
-        """Return a name, quoted or not."""
+    def name(self, what: str = '', kind: TextKind = NAME) -> str:
+        """Return a name or other text of one line, quoted or not."""
         text = self._scalar(kind.pattern)
         if text is None or not text.isprintable():
-            self.fail(f'{what}: {kind.allowed}')
-        return text
-
-    def text(self) -> str:
-        """Return free text of one line."""
-        text = self._scalar(LINE.pattern)
-        if text is None or not text.isprintable():
-            self.fail(LINE.allowed)
+            self.fail(f'{what}: {kind.allowed}' if what else kind.allowed)
         return text
 
     def choice(self, choices: tuple[str, ...]) -> str:
