@@ -112,7 +112,7 @@ Block = Heading | Sentence | Remark | Table | Equation | Entries
 def steps(e: Explanation) -> Iterator[Block]:
     """Yield the whole explanation, block by block."""
     yield from _introduction(e)
-    yield from _frames(e)
+    yield from _placed_frames(e)
     yield from _table(e)
     yield from _general_row(e)
     if e.symbols:
@@ -146,7 +146,7 @@ def _introduction(e: Explanation) -> Iterator[Block]:
     yield Remark(f'Joint positions: {", ".join(values)}. Lengths in mm.')
 
 
-def _frames(e: Explanation) -> Iterator[Block]:
+def _placed_frames(e: Explanation) -> Iterator[Block]:
     """Take steps 1 to 4, each a column of every frame."""
     posture = 'q = 0' if e.q is None else 'this q'
     other = 'z_(i+1)' if e.is_modified else 'z_(i-1)'
