@@ -108,7 +108,7 @@ def _words(words: str) -> str:
 
 
 def _escaped(words: str) -> str:
-    escaped = ''.join(_ESCAPES.get(letter, letter) for letter in words)
+    escaped = words.translate(str.maketrans(_ESCAPES))
     escaped = escaped.replace('->', r'$\to$').replace('   ', r'\quad ')
     return re.sub(r'(?<!\w)-(?=\d)', '$-$', escaped)
 
