@@ -40,7 +40,7 @@ TEST = [
     'pytest>=7.4',
     'pytest-xdist',
     'roboticstoolbox-python',
-    'setuptools<80',
+    'setuptools>=71,<80',
 ]
 LINT = [
     'check-jsonschema',

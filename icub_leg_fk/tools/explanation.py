@@ -100,25 +100,15 @@ class Explanation:
 class Decimals:
     """Arithmetic with floats, in numpy's matrices; `Exact` has the same methods."""
 
+    number = angle = float
+    length = staticmethod(in_mm)
+
     def __init__(self) -> None:
         self.symbols: dict[str, Cell] = {}
 
-    def number(self, value: float) -> float:
-        """Return a number as it is computed with."""
-        return value
-
-    def length(self, metres: float) -> float:
-        """Return a length in mm, without the last digit's rounding."""
-        return in_mm(metres)
-
-    def angle(self, radians: float) -> float:
-        """Return an angle as it is computed with."""
-        return radians
-
-    def cos_sin(self, angle: float) -> tuple[float, float]:
+    def cos_sin(self, angle: float) -> tuple[float, ...]:
         """Return cosine and sine, exact at right angles."""
-        cosine, sine = cos_sin(angle)
-        return float(cosine), float(sine)
+        return tuple(map(float, cos_sin(angle)))
 
     def matrix(self, rows: Sequence[Sequence[float]]) -> Array:
         """Return a matrix of rows."""
@@ -240,23 +230,28 @@ def _rows(
 def _basic_transforms(
     theta: Cell, d: Cell, a: Cell, alpha: Cell, numbers: Numbers
 ) -> dict[str, Matrix]:
-    ct, st = numbers.cos_sin(theta)
-    ca, sa = numbers.cos_sin(alpha)
-    return {
-        'Rz': numbers.matrix(
-            [[ct, -st, 0, 0], [st, ct, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
-        ),
-        'tz': numbers.matrix([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, d], [0, 0, 0, 1]]),
-        'tx': numbers.matrix([[1, 0, 0, a], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]),
-        'Rx': numbers.matrix(
-            [[1, 0, 0, 0], [0, ca, -sa, 0], [0, sa, ca, 0], [0, 0, 0, 1]]
-        ),
-    }
+    """Return the turns about and the moves along z and x, by name."""
+    (ct, st), (ca, sa) = numbers.cos_sin(theta), numbers.cos_sin(alpha)
+    transforms = {}
+    for name, entries in {
+        'Rz': {(0, 0): ct, (0, 1): -st, (1, 0): st, (1, 1): ct},
+        'tz': {(2, 3): d},
+        'tx': {(0, 3): a},
+        'Rx': {(1, 1): ca, (1, 2): -sa, (2, 1): sa, (2, 2): ca},
+    }.items():
+        transforms[name] = _identity(numbers)
+        for place, entry in entries.items():
+            transforms[name][place] = entry
+    return transforms
+
+
+def _identity(numbers: Numbers) -> Matrix:
+    return numbers.matrix(np.eye(4, dtype=int).tolist())
 
 
 def _running_products(rows: Sequence[ExplainedRow], numbers: Numbers) -> list[Matrix]:
     """Return T_01, T_02, ... T_0m."""
-    T = numbers.matrix([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+    T = _identity(numbers)
     products = []
     for row in rows:
         for name, factor in row.factors.items():
@@ -298,8 +293,8 @@ def _frames(
 
 def _constant(T: Array, numbers: Numbers) -> Matrix:
     """Return a transform that no joint changes, with its translation in mm."""
-    rows: list[list[Cell]] = []
-    for *axes, translation in T.tolist()[:3]:
-        rotation = [numbers.number(value) for value in axes]
-        rows.append([*rotation, numbers.length(translation)])
-    return numbers.matrix([*rows, [0, 0, 0, 1]])
+    constant = _identity(numbers)
+    for row, column in np.ndindex(3, 4):
+        read = numbers.length if column == 3 else numbers.number
+        constant[row, column] = read(float(T[row, column]))
+    return constant

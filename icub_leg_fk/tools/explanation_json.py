@@ -12,6 +12,9 @@ import numpy as np
 def as_json(e: Explanation) -> str:
     """Return the explanation as JSON; exact numbers and formulas are strings that sympy reads."""
     chain = e.chain
+    positions = None
+    if e.q is not None:
+        positions = [unit(link) * value for link, value in zip(chain.joints, e.q)]
     return text.as_json(
         {
             'chain': chain.name,
@@ -22,7 +25,7 @@ def as_json(e: Explanation) -> str:
             'units': {'length': 'mm', 'angle': 'rad'},
             'convention': chain.convention,
             'joints': list(chain.joint_names),
-            'joint_positions': _joint_positions(e),
+            'joint_positions': positions,
             'symbols': {name: str(meaning) for name, meaning in e.symbols.items()},
             'frames': [_frame(T) for T in e.frames.values()],
             'frame_names': list(e.frames),
@@ -33,12 +36,6 @@ def as_json(e: Explanation) -> str:
             'T_root_tip': _matrix(e.T_root_tip),
         }
     )
-
-
-def _joint_positions(e: Explanation) -> list[float] | None:
-    if e.q is None:
-        return None
-    return [unit(link) * value for link, value in zip(e.chain.joints, e.q, strict=True)]
 
 
 def _frame(T: Matrix) -> dict[str, list[float]]:

@@ -26,8 +26,10 @@ _PREAMBLE = (
     r'\begin{document}',
     r'\raggedright',
 )
-_ESCAPES = {'\\': r'\textbackslash{}', '^': r'\^{}', '~': r'\~{}'}
-_ESCAPES |= {letter: f'\\{letter}' for letter in '_&%$#{}'}
+_ESCAPES = str.maketrans(
+    {letter: f'\\{letter}' for letter in '_&%$#{}'}
+    | {'\\': r'\textbackslash{}', '^': r'\^{}', '~': r'\~{}'}
+)
 _SYMBOLS = (
     (r'(?<=\d) {2,}(?=[-\d])', r',\\ '),  # between coordinates
     (r'\b([Rt])([xz])\(', r'\1_\2('),  # Rz(...)
@@ -108,7 +110,7 @@ def _words(words: str) -> str:
 
 
 def _escaped(words: str) -> str:
-    escaped = ''.join(_ESCAPES.get(letter, letter) for letter in words)
+    escaped = words.translate(_ESCAPES)
     escaped = escaped.replace('->', r'$\to$').replace('   ', r'\quad ')
     return re.sub(r'(?<!\w)-(?=\d)', '$-$', escaped)
 

@@ -23,38 +23,16 @@ from icub_leg_fk.tools.explanation_symbols import (
 import numpy as np
 
 _GENERAL = {
-    'standard': [
-        [
-            'cos theta_i',
-            '-sin theta_i cos alpha_i',
-            'sin theta_i sin alpha_i',
-            'a_i cos theta_i',
-        ],
-        [
-            'sin theta_i',
-            'cos theta_i cos alpha_i',
-            '-cos theta_i sin alpha_i',
-            'a_i sin theta_i',
-        ],
-        ['0', 'sin alpha_i', 'cos alpha_i', 'd_i'],
-        ['0', '0', '0', '1'],
-    ],
-    'modified': [
-        ['cos theta_i', '-sin theta_i', '0', 'a_i'],
-        [
-            'sin theta_i cos alpha_i',
-            'cos theta_i cos alpha_i',
-            '-sin alpha_i',
-            '-d_i sin alpha_i',
-        ],
-        [
-            'sin theta_i sin alpha_i',
-            'cos theta_i sin alpha_i',
-            'cos alpha_i',
-            'd_i cos alpha_i',
-        ],
-        ['0', '0', '0', '1'],
-    ],
+    'standard': """\
+cos theta_i | -sin theta_i cos alpha_i |  sin theta_i sin alpha_i | a_i cos theta_i
+sin theta_i |  cos theta_i cos alpha_i | -cos theta_i sin alpha_i | a_i sin theta_i
+0           |  sin alpha_i             |  cos alpha_i             | d_i
+0           |  0                       |  0                       | 1""",
+    'modified': """\
+cos theta_i             | -sin theta_i             |  0           |  a_i
+sin theta_i cos alpha_i |  cos theta_i cos alpha_i | -sin alpha_i | -d_i sin alpha_i
+sin theta_i sin alpha_i |  cos theta_i sin alpha_i |  cos alpha_i |  d_i cos alpha_i
+0                       |  0                       |  0           |  1""",
 }
 _DEGREE = math.degrees(1)  # per radian
 _PARAMETERS = {
@@ -134,10 +112,7 @@ Block = Heading | Sentence | Remark | Table | Equation | Entries
 def steps(e: Explanation) -> Iterator[Block]:
     """Yield the whole explanation, block by block."""
     yield from _introduction(e)
-    yield from _z_axes(e)
-    yield from _origins(e)
-    yield from _x_axes(e)
-    yield from _y_axes(e)
+    yield from _placed_frames(e)
     yield from _table(e)
     yield from _general_row(e)
     if e.symbols:
@@ -171,46 +146,36 @@ def _introduction(e: Explanation) -> Iterator[Block]:
     yield Remark(f'Joint positions: {", ".join(values)}. Lengths in mm.')
 
 
-def _z_axes(e: Explanation) -> Iterator[Block]:
+def _placed_frames(e: Explanation) -> Iterator[Block]:
+    """Take steps 1 to 4, each a column of every frame."""
     posture = 'q = 0' if e.q is None else 'this q'
+    other = 'z_(i+1)' if e.is_modified else 'z_(i-1)'
+    turns = [_motion(row) for row in e.rows]
+    origins = [_origin(e, i) for i in range(len(e.rows) + 1)]
+    normals = [f'orthogonal to `z_{i}` and `z_{i + 1}`' for i in range(len(e.rows))]
+    if e.is_modified:
+        turns.insert(0, 'no joint: frame 0')
+        normals.append('free')
+    else:
+        turns.append('no joint: the last frame')
+        normals.insert(0, 'as `T_Ro0` has it')
     yield Heading(
         'Step 1. The z axis of each joint   '
         f'(coordinates in {e.chain.root_frame}, at {posture})'
     )
-    remarks = [_motion(row) for row in e.rows]
-    if e.is_modified:
-        remarks.insert(0, 'no joint: frame 0')
-    else:
-        remarks.append('no joint: the last frame')
-    yield _vectors(e, 'z', 2, remarks)
-
-
-def _origins(e: Explanation) -> Iterator[Block]:
+    yield _vectors(e, 'z', 2, turns)
     yield Heading(
-        'Step 2. The origin of each frame, on `z_i` where it meets '
-        f'`{_other_axis(e)}`   (mm)'
+        f'Step 2. The origin of each frame, on `z_i` where it meets `{other}`   (mm)'
     )
-    remarks = [_origin(e, i) for i in range(len(e.rows) + 1)]
-    yield _vectors(e, 'o', 3, remarks)
-
-
-def _x_axes(e: Explanation) -> Iterator[Block]:
+    yield _vectors(e, 'o', 3, origins)
     yield Heading(
-        f'Step 3. The x axis of each frame, orthogonal to `{_other_axis(e)}` and `z_i`'
+        f'Step 3. The x axis of each frame, orthogonal to `{other}` and `z_i`'
     )
-    remarks = [f'orthogonal to `z_{i}` and `z_{i + 1}`' for i in range(len(e.rows))]
-    if e.is_modified:
-        remarks.append('free')
-    else:
-        remarks.insert(0, 'as `T_Ro0` has it')
-    yield _vectors(e, 'x', 0, remarks)
-
-
-def _y_axes(e: Explanation) -> Iterator[Block]:
+    yield _vectors(e, 'x', 0, normals)
     yield Heading(
         'Step 4. The y axis of each frame, by the right-hand rule: `y_i = z_i x x_i`'
     )
-    yield _vectors(e, 'y', 1, [''] * (len(e.rows) + 1))
+    yield _vectors(e, 'y', 1, [''] * len(origins))
 
 
 def _vectors(e: Explanation, letter: str, column: int, remarks: Sequence[str]) -> Table:
@@ -241,20 +206,14 @@ def _joint(row: Row) -> str:
     return row.joint if row.is_first else f'follows {row.joint}'
 
 
-def _other_axis(e: Explanation) -> str:
-    """Return the axis that places frame i on its own z axis."""
-    return 'z_(i+1)' if e.is_modified else 'z_(i-1)'
-
-
 def _origin(e: Explanation, i: int) -> str:
     """Say why the origin of frame i is where it is."""
     if e.is_modified and i == len(e.rows):
         return 'where the last row puts it'
     if not e.is_modified and i == 0:
         return 'where `T_Ro0` puts it'
-    other, link = (
-        (i + 1, e.rows[i].link) if e.is_modified else (i - 1, e.rows[i - 1].link)
-    )
+    other = i + 1 if e.is_modified else i - 1
+    link = e.rows[min(i, other)].link
     apart = f'{short(MM * abs(link.a))} mm away'
     is_parallel = abs(math.sin(link.alpha)) < 1e-12
     if is_parallel and link.a:
@@ -318,7 +277,8 @@ def _moved(e: Explanation, row: ExplainedRow) -> str:
 
 def _general_row(e: Explanation) -> Iterator[Block]:
     yield Sentence(f'`A_i = T_i(i+1) = {_factors(e.rows[0], "i")}`')
-    yield Equation('', [np.array(_GENERAL[e.chain.convention])])
+    rows = [line.split('|') for line in _GENERAL[e.chain.convention].split('\n')]
+    yield Equation('', [np.char.strip(rows)])
     T = e.chain.T_n_tip
     row = DHLink(
         a=T[0, 3], d=T[2, 3], alpha=math.atan2(T[2, 1], T[2, 2]), joint_type='fixed'

@@ -5,7 +5,7 @@ are one, such as theta_3 - theta_4, and its cosine is written c_(3-4). Numbers a
 they are simple, as sqrt(3)/2 is; others, such as cos(100 deg), are decimals.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from functools import cache, reduce
 from importlib import import_module
@@ -112,22 +112,19 @@ class Exact:
 
     def _expanded(self, entry: Cell) -> Cell:
         """Return an entry as a sum of products, each with one number before its symbols."""
-        entry = self._sympy.expand(entry)
-        if not entry.has(self._sympy.Float):
-            return entry
         terms = []
-        for term in self._sympy.Add.make_args(entry):
-            number, symbols = term.as_independent(self._sympy.Symbol, as_Add=False)
-            terms.append(
-                number.n() * symbols if number.has(self._sympy.Float) else term
-            )
-        total = self._sympy.Add(*terms)
-        return total.xreplace(
-            {
-                value: self._sympy.Float(round(float(value), _NOISE))
-                for value in total.atoms(self._sympy.Float)
-            }
-        )
+        for number, symbols in _terms(self._sympy.expand(entry)):
+            if number.has(self._sympy.Float):
+                number = self._sympy.Float(round(float(number), _NOISE))
+            terms.append(number * symbols)
+        return self._sympy.Add(*terms)
+
+
+def _terms(entry: Cell) -> Iterator[tuple[Cell, Cell]]:
+    """Yield the terms of a sum, each as a number and its symbols."""
+    sympy = import_sympy()
+    for term in sympy.Add.make_args(entry):
+        yield term.as_independent(sympy.Symbol, as_Add=False)
 
 
 def symbol(name: str) -> Cell:
@@ -181,8 +178,7 @@ def _as_shown(expression: Cell) -> Cell:
     if expression.is_number:
         return _short_number(expression)
     terms = []
-    for term in sympy.Add.make_args(expression):
-        number, symbols = term.as_independent(sympy.Symbol, as_Add=False)
+    for number, symbols in _terms(expression):
         functions = symbols.atoms(sympy.cos, sympy.sin)
         names = {function: _abbreviation(function) for function in functions}
         terms.append(_short_number(number) * symbols.xreplace(names))

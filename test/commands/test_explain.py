@@ -4,7 +4,6 @@ from dataclasses import replace
 import re
 
 from hypothesis import given, settings
-from icub_leg_fk.__main__ import main
 from icub_leg_fk.kinematics.chain_text import joint_range
 from icub_leg_fk.kinematics.link import standard_rows
 from icub_leg_fk.tools.explanation import explain as explained
@@ -14,7 +13,6 @@ import numpy as np
 import pytest
 from support.any_chain import chains_and_positions
 from support.explain_cases import (
-    ARM,
     Case,
     every_chain,
     explain,
@@ -30,30 +28,32 @@ ORDERS = {'standard': ['Rz', 'tz', 'tx', 'Rx'], 'modified': ['Rx', 'tx', 'Rz', '
 V1_LEG = Case('left_leg=v1', 'dh')
 
 
+def assert_near(one, other, tolerance=1e-10):
+    assert np.abs(np.subtract(one, other)).max() < tolerance
+
+
 @every_chain
 def test_the_answer_is_the_chains_pose(case):
     chain, (q, words) = case.chain, case.radians(1)
     e = case.json(*words)
-    assert np.abs(in_metres(e['T_root_tip']) - chain.forward(q)).max() < 1e-12
-    assert (e['chain'], e['version']) == (chain.name, chain.version)
-    assert (e['root_frame'], e['frame_id']) == (chain.root_frame, chain.frame_id)
+    assert_near(in_metres(e['T_root_tip']), chain.forward(q), 1e-12)
+    about = [e[name] for name in ('chain', 'version', 'root_frame', 'frame_id')]
+    assert about == [chain.name, chain.version, chain.root_frame, chain.frame_id]
 
 
 @every_chain
 def test_each_step_follows_from_the_one_before(case):
     _, words = case.radians(2)
     e = case.json(*words)
-    T_0 = np.eye(4)
+    T = np.eye(4)
     for link, product in zip(e['links'], e['running_products'], strict=True):
         assert list(link['factors']) == ORDERS[e['convention']]
-        factors = [np.array(factor) for factor in link['factors'].values()]
-        assert np.allclose(np.linalg.multi_dot(factors), link['A'], rtol=0, atol=1e-10)
-        T_0 = T_0 @ link['A']
-        assert np.allclose(T_0, product, rtol=0, atol=1e-10)
-    T = np.array(e['T_root_0']) @ T_0
+        assert_near(np.linalg.multi_dot([*link['factors'].values()]), link['A'])
+        T = T @ link['A']
+        assert_near(T, product)
     for after in e['after_last_link'].values():
         T = T @ after
-    assert np.allclose(T, e['T_root_tip'], rtol=0, atol=1e-10)
+    assert_near(e['T_root_0'] @ T, e['T_root_tip'])
 
 
 @every_chain
@@ -67,12 +67,11 @@ def test_the_frames_obey_the_first_four_steps_of_the_method(case):
     for own, other in zip(frames[1:], frames, strict=False):
         if e['convention'] == 'modified':  # where x_i is orthogonal to the next axis
             own, other = other, own
-        assert abs(np.dot(own['x'], other['z'])) < 1e-12
-        assert abs(np.dot(own['x'], own['z'])) < 1e-12
-        assert np.allclose(np.cross(own['z'], own['x']), own['y'], atol=1e-12)
+        assert_near([np.dot(own['x'], z) for z in (other['z'], own['z'])], 0, 1e-12)
+        assert_near(np.cross(own['z'], own['x']), own['y'], 1e-12)
         # x points along the common normal, so that from the other axis it meets the origin.
         reach = np.subtract(own['origin'], other['origin'])
-        assert abs(np.dot(np.cross(other['z'], own['x']), reach)) < 1e-9
+        assert_near(np.dot(np.cross(other['z'], own['x']), reach), 0, 1e-9)
 
 
 @settings(max_examples=30)
@@ -84,24 +83,9 @@ def test_any_table_in_either_convention_is_explained(drawn):
     )
     for chain in (standard, modified):
         e = explained(chain, q)
-        T = chain.forward(q)
-        assert np.allclose(in_metres(e.T_root_tip), T, rtol=1e-12, atol=1e-12)
+        # Millimetres are rounded to 13 digits, and metres may add up.
+        assert_near(in_metres(e.T_root_tip), chain.forward(q), 2e-11)
         assert as_text(e) and as_latex(e)
-
-
-@pytest.mark.parametrize(
-    ('name', 'position'),
-    [
-        ('left_leg=v1', 'x = 0, y = -68.1, z = -597.5'),
-        ('right_leg=v1', 'x = 0, y = 68.1, z = -597.5'),
-        ('left_leg=v2_5', 'x = 4.4175, y = -68.1, z = -622.995'),
-        ('right_leg=v2_5', 'x = 4.4175, y = 68.1, z = -622.995'),
-        ('head_imu=v2', 'x = 13, y = 6.6, z = 375.6'),
-    ],
-)
-def test_at_zero_the_text_ends_with_the_documented_position(name, position):
-    text = explain(name, '--degrees', *[0] * 6)
-    assert f'is at {position} mm in root_link.' in text.splitlines()[-1]
 
 
 def numbers(words):
@@ -112,24 +96,12 @@ def numbers(words):
 def test_text_latex_and_json_give_the_same_answer(case):
     _, words = case.radians(4)
     text, latex = case.explain(*words), case.explain('--latex', *words)
-    answer = np.ravel(case.json(*words)['T_root_tip'])
     in_text = ' '.join(re.findall(r'\[(.*)\]', text)[-4:])
     in_latex = re.findall(r'\\begin\{bmatrix\}(.*)\\end\{bmatrix\}', latex)[-1]
-    assert numbers(in_text) == pytest.approx(answer, abs=6e-5)
+    assert_near(numbers(in_text), np.ravel(case.json(*words)['T_root_tip']), 6e-5)
     assert numbers(in_latex) == numbers(in_text)
     sentence = next(line for line in text.splitlines() if ' is at x = ' in line)
     assert sentence.replace('_', r'\_') in latex.replace('$-$', '-')
-
-
-def test_numbers_stand_with_their_points_under_each_other():
-    lines = LEG.explain('--degrees', 10, 12, 14, -30, -15, 5).splitlines()
-    first = (
-        next(i for i, line in enumerate(lines) if 'T_RoLf = T_Ro0 T_06 = [' in line) - 1
-    )
-    points = []
-    for line in lines[first : first + 3]:
-        points.append([match.start() for match in re.finditer(r'\.', line)])
-    assert len(points[0]) == 4 and points[0] == points[1] == points[2]
 
 
 @one_chain_of_each_kind
@@ -137,36 +109,6 @@ def test_every_line_fits_a_terminal(case):
     _, words = case.radians(5)
     for text in (case.explain(), case.explain(*words)):
         assert max(map(len, text.splitlines())) <= 100
-
-
-def test_a_prismatic_arm_is_explained_as_the_textbook_has_it():
-    text = ARM.explain()
-    # T_03 of Spong, Hutchinson and Vidyasagar's example 3.2, with d_1 = 400 and their d_2, d_3.
-    assert text.count('T_RoE = T_Ro0 T_03 =') == 1
-    rows = [' '.join(row.split()) for row in re.findall(r'\[([^]]*)\]', text)[-4:]]
-    assert rows == [
-        'c_0 0 -s_0 -d_2 s_0',
-        's_0 0 c_0 c_0 d_2',
-        '0 -1 0 d_1 + 400',
-        '0 0 0 1',
-    ]
-    assert 'd_2      = q_2 + 150' in text and 'lift slides along it' in text
-
-
-def test_the_steps_are_walked_in_order():
-    text = LEG.explain('--degrees', *[0] * 6)
-    places = [text.index(f'Step {i}.') for i in range(1, 7)]
-    assert places == sorted(places)
-    for words in (
-        'A_5 = T_56 = Rz(theta_5) tz(d_5) tx(a_5) Rx(alpha_5)',
-        'T_06 = T_05 A_5',
-        'T_Ro0 =',
-        'T_RoLf = T_Ro0 T_06',
-        'z_2 ends, 0.9175 mm away',
-        'z_0 and z_1 meet here',
-        'z_4 parallel to z_3, 200.5 mm away',
-    ):
-        assert words in text
 
 
 @pytest.mark.parametrize('case', [LEG, V1_LEG, ODD])
@@ -184,40 +126,16 @@ def test_text_and_json_give_the_same_ranges(case):
 
 
 def test_rows_that_follow_another_joint_are_named_as_such():
-    text = ODD.explain()
-    assert 'a row that follows elbow turns about it' in text
-    table = [
-        ' '.join(line.split())
-        for line in text.splitlines()
-        if line.startswith('  i = ')
-    ]
-    assert table[1] == 'i = 1 250 0 pi -40.107 - (-90 -> +90) elbow'
-    assert table[5:] == [
+    lines = [' '.join(line.split()) for line in ODD.explain().splitlines()]
+    for line in (
+        'i = 1 250 0 pi -40.107 - (-90 -> +90) elbow',
         'i = 5 30 0 -pi/2 5.7296 + 0.5 q follows elbow',
-        'i = 6 0 200 + 0.349066 q 0 0 follows shoulder',
-    ]  # mm per degree
-    assert 'theta_5 = 0.5 q_1 + 0.1' in text and 'd_6 = 20 q_0 + 200' in text
-
-
-@pytest.mark.parametrize(
-    ('words', 'complaint'),
-    [
-        ([], 'CHAIN'),
-        (['left_foot'], "unknown chain 'left_foot'"),
-        (['left_leg', '--version', 'v4'], 'known: v1, v2_5, v3'),
-        (['left_leg', '--foot-frame', 'toe'], 'known: dh, sole'),
-        (['left_leg', '--degrees', '1', '2'], 'in the order l_hip_pitch'),
-        (['left_leg', '--degrees', 'x'], "'x'"),
-        (['left_leg', '--json', '--latex'], 'not allowed with'),
-        (['left_leg', '--degrees', '1', '--radians', '1'], 'not allowed with'),
-        (['left_leg', '-k', 'missing.yaml'], 'missing.yaml'),
-    ],
-)
-def test_a_mistake_is_one_line_and_exit_2(words, complaint, capsys):
-    assert main(['explain', *words]) == 2
-    output, error = capsys.readouterr()
-    assert output == '' and error.count('\n') == 1
-    assert error.startswith('leg_fk: error: ') and complaint in error
+        'i = 6 0 200 + 0.349066 q 0 0 follows shoulder',  # mm per degree
+        'theta_5 = 0.5 q_1 + 0.1',
+        'd_6 = 20 q_0 + 200',
+    ):
+        assert line in lines
+    assert 'a row that follows elbow turns about it' in ' '.join(lines)
 
 
 def test_joints_outside_their_range_are_said_as_in_pose():

@@ -26,26 +26,23 @@ sympy = pytest.importorskip('sympy')
 FORMS = ['formula', 'decimals', 'exact']
 in_each_form = pytest.mark.parametrize('form', FORMS)
 
-LONG_ARM = (
-    """\
-units: {length: mm, angle: deg}
+PRISMATIC = '          - {a: 0, d: 0, alpha: 0, type: prismatic}\n'
+TURN = '          - {a: 10, d: 0, alpha: 0}\n'
+# More than ten joints, of which 1 and 2 turn about parallel axes, and 12 turns too.
+LONG_ARM = f"""\
+units: {{length: mm, angle: deg}}
 chains:
   arm:
     tip: tip
     root_frame: base
     joints: [j0, j1, j2, j3, j4, j5, j6, j7, j8, j9, j10, j11, j12]
-    tip_frames: {dh: {frame: tip}}
+    tip_frames: {{dh: {{frame: tip}}}}
     versions:
       v1:
         links:
-          - {a: 0, d: 0, alpha: 90, type: prismatic}
-          - {a: 10, d: 0, alpha: 0}
-          - {a: 0, d: 0, alpha: 90}
-"""
-    + 9 * '          - {a: 0, d: 0, alpha: 0, type: prismatic}\n'
-    + ('          - {a: 10, d: 0, alpha: 0}\n')
-)
-"""More than ten joints, of which 1 and 2 turn about parallel axes, and 12 turns too."""
+          - {{a: 0, d: 0, alpha: 90, type: prismatic}}
+{TURN}          - {{a: 0, d: 0, alpha: 90}}
+{9 * PRISMATIC}{TURN}"""
 
 
 def formula(e):
@@ -84,28 +81,13 @@ def test_exact_numbers_are_the_chains_pose(case):
 
 def test_right_angles_and_lengths_are_exact():
     e = LEG.json('--symbolic', '--degrees', 0, 0, 0, -30, 0, 0)
-    assert [link['alpha'] for link in e['links']] == [
-        '-pi/2',
-        '-pi/2',
-        'pi/2',
-        'pi',
-        '-pi/2',
-        '0',
-    ]
-    assert [link['theta'] for link in e['links']][:4] == [
-        'pi/2',
-        'pi/2',
-        '-pi/2',
-        'pi/3',
-    ]
-    assert [link['a'] for link in e['links']] == [
-        '0',
-        '0',
-        '-367/400',
-        '-401/2',
-        '0',
-        '-1361/20',
-    ]
+    exact = {
+        'alpha': '-pi/2 -pi/2 pi/2 pi -pi/2 0',
+        'theta': 'pi/2 pi/2 -pi/2 pi/3 0 0',
+        'a': '0 0 -367/400 -401/2 0 -1361/20',
+    }
+    for name, cells in exact.items():
+        assert [link[name] for link in e['links']] == cells.split()
     assert not re.search(r'\d\.\d', json.dumps(e['T_root_tip']))
     assert sympy.sympify(e['T_root_tip'][2][0]) == sympy.sqrt(3) / 2
 
@@ -191,9 +173,8 @@ def test_latex_is_balanced(case, form):
     depths = np.cumsum([(letter == '{') - (letter == '}') for letter in bare])
     assert depths.min() == depths[-1] == 0
     assert bare.count('$') % 2 == 0
-    outside = re.sub(r'\$[^$]*\$|\\\[.*?\\\]', '', bare)
-    assert '_' not in outside
-    assert '^' not in outside.replace(r'\^{}', '')
+    outside = re.sub(r'\$[^$]*\$|\\\[.*?\\\]|\\\^\{\}', '', bare)
+    assert not {'_', '^'} & {*outside}
 
 
 @pytest.mark.skipif(not shutil.which('pdflatex'), reason='pdflatex is not installed')

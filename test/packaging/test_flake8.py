@@ -7,7 +7,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def test_ament_flake8_finds_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ament_flake8_finds_nothing(monkeypatch):
     ament_flake8 = pytest.importorskip('ament_flake8.main')
     monkeypatch.chdir(ROOT)
     # Of tests, benchmarks and documentation ruff asks the same, in a hundredth of the time.

@@ -1,4 +1,4 @@
-"""The script of the documentation, on a real Dask cluster of two processes."""
+"""The script of the documentation, on a real Dask cluster in another process."""
 
 from pathlib import Path
 import subprocess
@@ -19,20 +19,11 @@ def test_a_fleet_of_recordings_is_a_map_over_one_function(tmp_path):
     (tmp_path / 'in' / 'broken').mkdir()
     (tmp_path / 'in' / 'broken' / 'metadata.yaml').write_text('nothing')
     with distributed.LocalCluster(
-        n_workers=2, processes=True, threads_per_worker=1, dashboard_address=None
+        n_workers=1, processes=True, threads_per_worker=1, dashboard_address=None
     ) as cluster:
+        words = [SCRIPT, tmp_path / 'in', tmp_path / 'out', cluster.scheduler_address]
         done = subprocess.run(
-            [
-                sys.executable,
-                SCRIPT,
-                tmp_path / 'in',
-                tmp_path / 'out',
-                cluster.scheduler_address,
-            ],
-            capture_output=True,
-            text=True,
-            timeout=120,
-            check=False,
+            [sys.executable, *words], capture_output=True, text=True, timeout=120
         )
     assert done.returncode == 1, done.stderr
     assert done.stdout.count('Summary(') == 3

@@ -33,11 +33,11 @@ LEG_FK = re.compile(
 NEEDS_ROS = re.compile(r'.*\bros2 |rosdep |colcon |\. install|python3 -m venv|~/')
 
 
-def blocks(text: str, kind: str) -> list[str]:
+def blocks(text, kind):
     return re.findall(rf'^```{kind}\n(.*?)^```', text, re.DOTALL | re.MULTILINE)
 
 
-def commands(text: str) -> list[str]:
+def commands(text):
     """Return the lines that have a prompt, without it."""
     return re.findall(r'^ *\$ (.+)$', text, re.MULTILINE)
 
@@ -132,11 +132,11 @@ def test_every_command_has_arguments_that_are_known(page):
             leg_fk.parse(shlex.split(found[1]))
 
 
-def texts(module: Path) -> list[str]:
+def texts(module):
     return texts_of(ast.parse(module.read_text()))
 
 
-def texts_of(tree: ast.AST) -> list[str]:
+def texts_of(tree):
     """Return the texts in some code, docstrings apart; of an f-string its fixed parts."""
     nodes = list(ast.walk(tree))
     docstrings = [node.value for node in nodes if isinstance(node, ast.Expr)]
@@ -179,7 +179,7 @@ def test_every_message_on_the_input_is_explained(module):
                 assert part.strip() in PAGES['no_poses.md']
 
 
-def faults(module: Path) -> list[list[str]]:
+def faults(module):
     """Return the texts of each error and note that a module makes."""
     made = re.compile(
         r'FileError$|LegFKError$|ParameterError$|fail$|^Note$|\.notes\.append$'
@@ -204,7 +204,7 @@ def test_every_fault_is_explained(module):
         )
 
 
-def parameters() -> dict[str, object]:
+def parameters():
     (section,) = yaml.safe_load(
         (ROOT / 'config/foot_pose_publisher.yaml').read_text()
     ).values()
@@ -240,7 +240,7 @@ def test_links_and_pictures_lead_somewhere(page):
 UNTIL_CTRL_C = {'foot_pose_publisher': 0, 'leg_fk view': 130}
 
 
-def until_ctrl_c(command: str) -> str:
+def until_ctrl_c(command):
     """Return a command that ends, with an error where its exit status is a wrong one."""
     for start, status in UNTIL_CTRL_C.items():
         if command.startswith(start):
@@ -249,7 +249,7 @@ def until_ctrl_c(command: str) -> str:
     return command
 
 
-def script(page: str) -> str:
+def script(page):
     """Return what somebody without ROS types who follows a page; the rest is told."""
     lines = ['set -ex', '. .venv/bin/activate']
     kinds = re.findall(
@@ -268,7 +268,7 @@ def script(page: str) -> str:
 
 
 @pytest.fixture(scope='module')
-def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def clone(tmp_path_factory):
     """Return a clone in which only `make demo` was typed."""
     folder = tmp_path_factory.mktemp('clone')
     subprocess.run(['git', 'clone', '--quiet', ROOT, folder], check=True)
@@ -276,7 +276,7 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def type_in(folder: Path, lines: str) -> None:
+def type_in(folder, lines):
     """Run lines of a shell that knows nothing of this run's environment."""
     environment = {
         name: value

@@ -11,11 +11,12 @@ from icub_leg_fk.__main__ import main
 COMMAND = [sys.executable, '-m', 'icub_leg_fk']
 
 
-def leg_fk(*words, environment=None):
+def leg_fk(*words, environment=None, stdout=subprocess.PIPE):
     """Run `leg_fk` to its end; return the finished process with its output as text."""
     return subprocess.run(
         [*COMMAND, *map(str, words)],
-        capture_output=True,
+        stdout=stdout,
+        stderr=subprocess.PIPE,
         text=True,
         timeout=60,
         env={**os.environ, **(environment or {})},
