@@ -39,30 +39,22 @@ class JointStateReader:
         Raises:
             MalformedMessageError: the bytes are not a JointState.
         """
-        for form in self._forms:
-            if form.fits(data):
-                if form is not self._forms[0]:
+        for fits in (Form.fits, Form.fits_but_for_padding):
+            for form in self._forms:
+                if fits(form, data):
                     self._put_first(form)
-                return form
-        form = self._form_but_for_padding(data) or Form(
-            data, read_layout(data), self._chains
-        )
-        self._put_first(form)
-        return form
-
-    def _form_but_for_padding(self, data: bytes) -> Form | None:
-        for form in self._forms:
-            if form.fits_but_for_padding(data):
-                return form
-        return None
-
-    def _put_first(self, form: Form) -> None:
-        """Let a form be the first that is tried, and forget what came long ago."""
-        if form in self._forms:
-            self._forms.remove(form)
+                    return form
+        form = Form(data, read_layout(data), self._chains)
         if form.names_end <= _LARGEST_REMEMBERED:
             self._forms.insert(0, form)
             del self._forms[_REMEMBERED:]
+        return form
+
+    def _put_first(self, form: Form) -> None:
+        """Let a form be the first that is tried."""
+        if form is not self._forms[0]:
+            self._forms.remove(form)
+            self._forms.insert(0, form)
 
 
 class Form:

@@ -151,15 +151,6 @@ def test_silence_with_what_was_before_and_who_is_there(watch):
         assert watch.looks() == []
 
 
-def test_silence_with_publishers_of_another_type():
-    [line] = Watch().looks(
-        5, names=(), publishers=[], other_types=['std_msgs/msg/String']
-    )
-    assert line.endswith(
-        '; it has no publisher of this type, only of std_msgs/msg/String'
-    )
-
-
 def test_names_that_match_now_and_then(watch):
     for _ in range(5):
         assert watch.looks(3, names=RIGHT) + watch.looks(2) == []

@@ -248,7 +248,7 @@ def test_another_signal_while_it_is_going_down_changes_nothing():
         time.sleep(0.05)  # again the moment under test; the node may be gone by then
         if node.process.poll() is None:
             node.process.send_signal(TERM)
-        node.check_end(0)
+        node.check_end()
 
 
 def test_signals_in_the_midst_of_traffic_end_it_well_whatever_the_log_is_set_to():
