@@ -41,7 +41,7 @@ from icub_leg_fk.tools.bags import (
     reliable_qos,
     STORAGES,
 )
-from icub_leg_fk.tools.joint_states import SECOND
+from icub_leg_fk.tools.joint_states import PREFIX_OPTION, SECOND
 from icub_leg_fk.tools.output_file import check_target, is_bag
 from icub_leg_fk.tools.progress import Progress
 from icub_leg_fk.tools.recorded_robot import (
@@ -54,7 +54,6 @@ from icub_leg_fk.tools.recorded_robot import (
 from icub_leg_fk.tools.recording import (
     has_topics,
     open_recording,
-    PREFIX_OPTION,
     Recording,
 )
 

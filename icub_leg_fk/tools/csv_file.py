@@ -21,7 +21,7 @@ from icub_leg_fk.kinematics.input_bytes import first_bytes
 from icub_leg_fk.stream.cdr import JointStateEncoder
 from icub_leg_fk.stream.notes import name_hint
 from icub_leg_fk.tools.input_file import lines_of
-from icub_leg_fk.tools.joint_states import Messages, Part, SECOND
+from icub_leg_fk.tools.joint_states import Messages, Part, PREFIX_OPTION, SECOND
 from icub_leg_fk.tools.options import LARGEST, number
 from icub_leg_fk.tools.progress import Progress
 
@@ -236,12 +236,11 @@ class _Header:
     def __init__(self, path: Path, dialect: Dialect) -> None:
         self._place = f'{path}:{dialect.header_line}'
         self._names = dialect.header
+        self._meanings = [_joint_of(name) for name in self._names]
         shown = [repr(name)[1:-1][:_LONGEST_SHOWN] for name in self._names[:_SHOWN]]
         self._shown = ', '.join(shown)
         if not any(self._names):
-            raise InputFileError(
-                self._place, 'no header; allowed: names of columns: time and joints'
-            )
+            raise self._fault('no header; allowed: names of columns: time and joints')
 
     def time_column(self) -> tuple[Column, str]:
         """Return the column of times, and the unit in its name; empty if there is none."""
@@ -256,10 +255,9 @@ class _Header:
         for plain in _TIME_NAMES:
             if plain in found:
                 return found[plain]
-        raise InputFileError(
-            self._place,
+        raise self._fault(
             f'no column of times in the header ({self._shown}); '
-            f'allowed: {", ".join(_TIME_NAMES)}',
+            f'allowed: {", ".join(_TIME_NAMES)}'
         )
 
     def joint_columns(self, chains: Sequence[Chain]) -> list[list[Column]]:
@@ -270,32 +268,32 @@ class _Header:
             column = self._column_of(joint)
             if column is not None:
                 columns[joint] = column
+        if not columns:
+            raise self._missing(list(wanted), chains, columns)
         groups = []
+        left = dict(columns)
         for chain in chains:
             missing = [name for name in chain.joint_names if name not in columns]
             if missing and len(missing) < chain.n:
                 raise self._missing(missing, chains, columns)
             groups.append(
-                [columns[name] for name in chain.joint_names if name in columns]
+                [left.pop(name) for name in chain.joint_names if name in left]
             )
-        if not columns:
-            raise self._missing(list(wanted), chains, columns)
-        return _without_repeats(groups)
+        return [group for group in groups if group]
 
     def _column_of(self, joint: str) -> Column | None:
         """Return the column of a joint's positions: of just this name, or of one that says so."""
-        places = [place for place, name in enumerate(self._names) if name == joint]
-        factor = 1.0
-        if not places:
+        places = list(enumerate(self._names))
+        found = [Column(joint, place) for place, name in places if name == joint]
+        if not found:
             last = joint.rpartition('/')[2]
-            for place, name in enumerate(self._names):
-                meant, unit = _joint_of(name)
+            for place, name in places:
+                meant, factor = self._meanings[place]
                 if meant == last and joint in name:
-                    places.append(place)
-                    factor = unit
-        if len(places) > 1:
-            raise self._twice(*(self._names[place] for place in places[:2]))
-        return Column(joint, places[0], factor) if places else None
+                    found.append(Column(joint, place, factor))
+        if len(found) > 1:
+            raise self._twice(*(self._names[column.place] for column in found[:2]))
+        return found[0] if found else None
 
     def _missing(
         self, joints: Sequence[str], chains: Sequence[Chain], found: Collection[str]
@@ -303,20 +301,19 @@ class _Header:
         whole = [chain.name for chain in chains if set(chain.joint_names) <= set(found)]
         advice = f'; or --chains {" ".join(whole)}' if whole else ''
         if not found:
-            advice = name_hint(joints, self._names, '', '--joint-prefix ')
-        return InputFileError(
-            self._place,
-            f'column {", ".join(joints)} is missing in the header '
-            f'({self._shown}){advice}',
+            advice = name_hint(joints, self._names, '', PREFIX_OPTION)
+        return self._fault(
+            f'column {", ".join(joints)} is missing in the header ({self._shown}){advice}'
         )
 
     def _twice(self, one: str, other: str) -> InputFileError:
         names = one if one == other else f'{one} and {other}'
-        return InputFileError(
-            self._place,
-            f'column {names} appears twice in the header '
-            f'({self._shown}); allowed: once',
+        return self._fault(
+            f'column {names} appears twice in the header ({self._shown}); allowed: once'
         )
+
+    def _fault(self, fault: str) -> InputFileError:
+        return InputFileError(self._place, fault)
 
 
 class _RowEncoder:
@@ -422,15 +419,3 @@ def _joint_of(name: str) -> tuple[str, float]:
         return '', 1.0
     is_in_degrees = unit in _DEGREES or match[2] == 'deg'
     return match[1], math.radians(1.0) if is_in_degrees else 1.0
-
-
-def _without_repeats(groups: Iterable[Iterable[Column]]) -> list[list[Column]]:
-    """Return groups of columns, each column only where it comes first."""
-    seen: set[Column] = set()
-    kept = []
-    for group in groups:
-        new = [column for column in group if column not in seen]
-        seen.update(new)
-        if new:
-            kept.append(new)
-    return kept

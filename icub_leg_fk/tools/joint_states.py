@@ -10,6 +10,7 @@ from pathlib import Path
 from icub_leg_fk.tools.progress import Progress
 
 SECOND = 1_000_000_000  # ns
+PREFIX_OPTION = '--joint-prefix '  # and what is put before the names of joints
 
 Messages = Iterator[
     tuple[int, bytes]

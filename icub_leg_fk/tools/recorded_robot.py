@@ -185,8 +185,7 @@ def robot_of(
         )
     robot = _described(chains, sent, min(bag.span[0] for bag in bags))
     if not robot.periods:
-        fault = f'no description of the robot can be used: {robot.warnings[0]}'
-        raise InputFileError(name, fault)
+        raise InputFileError(name, robot.warnings[0])
     return robot
 
 
@@ -229,7 +228,7 @@ def _described(wanted: Described, sent: Sequence[_Sent], start: int) -> Robot:
         robot.notes.append(
             f'{since}computing with the description of {urdf.name} on {topic}'
         )
-        robot.notes += configuration.notes
+        robot.notes += [line for line in configuration.notes if line not in robot.notes]
         first = time if robot.periods else -math.inf
         robot.periods.append(Period(first, configuration.chains))
     return robot

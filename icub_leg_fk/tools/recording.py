@@ -32,7 +32,7 @@ from icub_leg_fk.tools.bags import (
     STORAGES,
 )
 from icub_leg_fk.tools.csv_file import CsvFile
-from icub_leg_fk.tools.joint_states import Messages, Part, SECOND
+from icub_leg_fk.tools.joint_states import Messages, Part, PREFIX_OPTION, SECOND
 from icub_leg_fk.tools.progress import part_of, Progress
 from icub_leg_fk.tools.recorded_robot import (
     Described,
@@ -48,8 +48,6 @@ KINDS = (
     'a bag (directory, .mcap or .db3), a CSV file (.csv, .tsv or .txt) or a directory of '
     'yarpdatadumper'
 )
-
-PREFIX_OPTION = '--joint-prefix '
 
 _OF_ROS_1 = '.bag'
 _COMPRESSED = '.zstd'

@@ -126,7 +126,7 @@ def test_chains_of_any_robot_are_links_below_a_root():
     assert run_main('poses', *words, 'l2').stdout.startswith('time,l2_x,')
     assert_one_line_complaint(
         run_main('poses', *words, 'l3'),
-        'in: no description of the robot can be used: description of the robot 0.000 s '
+        'in: description of the robot 0.000 s '
         "after the start not used: unknown chain 'l3'; known: l2",
     )
 
@@ -158,7 +158,11 @@ def test_what_cannot_be_is_one_line(command):
             'in: no description of the robot on /robot_description; topics of type '
             'std_msgs/msg/String: /urdf',
         ),
-        ('in', '/urdf', 'no description of the robot can be used: desc'),
+        (
+            'in',
+            '/urdf',
+            'in: description of the robot 0.000 s after the start not used: /u',
+        ),
         ('in', '--version v1', "--version: found 'v1', allowed"),
         ('in', '-k robot.urdf', 'goes without a kinematics file'),
         ('in', 'urdf', "found 'urdf', allowed: a topic with a slash"),

@@ -45,16 +45,23 @@ def assert_poses_of(table, chain, positions, times=TIMES):
         assert np.allclose(table[f'{chain.tip}_{name}'], T[:, i, 3], rtol=0, atol=1e-6)
 
 
-def written(names, times, positions=POSITIONS, delimiter=',', number=repr):
-    """Return a CSV text; `number` makes a cell of a float."""
-    lines = [delimiter.join(names)]
-    for time, q in zip(times, positions):
-        cells = [time, *(number(value) for value in q.tolist())]
-        lines.append(delimiter.join(cells))
-    return '\n'.join(lines) + '\n'
-
-
+JOINTS = LEFT.joint_names
 SECONDS = [f'{time:.2f}' for time in TIMES]
+
+
+def written(
+    time='time',
+    times=SECONDS,
+    forms=('{}',),
+    positions=POSITIONS,
+    delimiter=',',
+    point='.',
+):
+    """Return a CSV text: names as they are formed of those of the joints, and numbers."""
+    rows = [[time, *(form.format(joint) for joint in JOINTS for form in forms)]]
+    for at, q in zip(times, positions):
+        rows.append([cell.replace('.', point) for cell in (at, *map(repr, q.tolist()))])
+    return '\n'.join(map(delimiter.join, rows)) + '\n'
 
 
 def since_1970(per_second):
@@ -62,60 +69,39 @@ def since_1970(per_second):
     return [str(time * per_second // 1000) for time in ms]
 
 
-def decimal_comma(value):
-    return repr(value).replace('.', ',')
-
-
-JOINTS = LEFT.joint_names
-PLOTJUGGLER = [
-    name
-    for joint in JOINTS
-    for name in (f'/joint_states/{joint}/position', f'/joint_states/{joint}/velocity')
-]
 DIALECTS = {
-    'plain.csv': written(('time', *JOINTS), SECONDS),
-    'commas.csv': written(
-        ('time', *JOINTS),
-        [time.replace('.', ',') for time in SECONDS],
-        delimiter=';',
-        number=decimal_comma,
-    ),
-    'tabs.tsv': written(('Time', *JOINTS), SECONDS, delimiter='\t'),
-    'numpy.txt': '# ' + written(('t', *JOINTS), SECONDS, delimiter=' '),
-    'blanks.txt': written(('time', *JOINTS), SECONDS, delimiter='   '),
-    'windows.csv': written(('time', *JOINTS), SECONDS).encode('utf-16'),
+    'plain.csv': written(),
+    'commas.csv': written(delimiter=';', point=','),
+    'tabs.tsv': written('Time', delimiter='\t'),
+    'numpy.txt': '# ' + written('t', delimiter=' '),
+    'blanks.txt': written(delimiter='   '),
+    'windows.csv': written().encode('utf-16'),
     'excel.csv': b'\xef\xbb\xbf'
-    + (
-        'sep=;\r\n'
-        + written(
-            ('time', *JOINTS), SECONDS, delimiter=';', number=decimal_comma
-        ).replace('\n', '\r\n')
-    ).encode(),
+    + f'sep=;\n{written(delimiter=";", point=",")}'.replace('\n', '\r\n').encode(),
     'plotjuggler.csv': written(
-        ('__time', *PLOTJUGGLER),
+        '__time',
         [f'{SINCE_1970 + time:.6f}' for time in TIMES],
+        ('/joint_states/{}/position', '/joint_states/{}/velocity'),
         np.repeat(POSITIONS, 2, axis=1) * ([1, -9] * 6),
     ),
-    'nanoseconds.csv': written(('timestamp', *JOINTS), since_1970(1_000_000_000)),
-    'microseconds.csv': written(('timestamp', *JOINTS), since_1970(1_000_000)),
-    'milliseconds.csv': written(('stamp', *JOINTS), since_1970(1000)),
+    'nanoseconds.csv': written('timestamp', since_1970(1_000_000_000)),
+    'microseconds.csv': written('timestamp', since_1970(1_000_000)),
+    'milliseconds.csv': written('stamp', since_1970(1000)),
     'floats.csv': written(
-        ('time', *JOINTS),
-        [
-            f'{SINCE_1970 + time:.4e}' if time == 0 else repr(SINCE_1970 + time)
-            for time in TIMES.tolist()
-        ],
+        times=['1.7000e+09', *(repr(SINCE_1970 + t) for t in TIMES[1:].tolist())]
     ),
-    'units.csv': written(('time [s]', *(f'{name} [rad]' for name in JOINTS)), SECONDS),
+    'units.csv': written('time [s]', forms=('{} [rad]',)),
     'degrees.csv': written(
-        ('time_ms', *(f'{name} [deg]' for name in JOINTS)),
+        'time_ms',
         [f'{1000 * time:.0f}' for time in TIMES],
+        ('{} [deg]',),
         np.degrees(POSITIONS),
     ),
     'words.csv': '\n'
     + written(
-        ('"note"', '"time"', *(f'joint_states.position.{name}' for name in JOINTS)),
+        '"note","time"',
         [f'"a, b",{time}' for time in SECONDS],
+        ('joint_states.position.{}',),
     ),
 }
 
@@ -142,14 +128,14 @@ def test_times_since_1970_are_kept_to_the_nanosecond():
         ('timestamp', '1700000000123456789', '1700000000.123456789,'),
         ('time', '-0.5', '-0.500000000,'),
     ):
-        Path('a.csv').write_text(written((name, *JOINTS), [time]))
+        Path('a.csv').write_text(written(name, [time]))
         done = run_main('poses', 'a.csv', '--chains', 'left_leg')
         assert done.stdout.splitlines()[1].startswith(shown)
 
 
 @pytest.mark.parametrize('gap', ['', 'NaN', 'null'])
 def test_empty_cells_and_nan_are_gaps(gap):
-    lines = written(('time', *JOINTS), SECONDS).splitlines()
+    lines = written().splitlines()
     lines[6] = f'0.10,0,0,0,{gap},0,0'
     lines[11] = ','.join(['0.20', *[gap] * 6])
     Path('gaps.csv').write_text('\n'.join(lines))
@@ -174,9 +160,7 @@ def test_legs_in_rows_of_their_own_are_no_gaps():
 
 
 def test_times_in_an_unlikely_unit_are_warned_of():
-    Path('ms.csv').write_text(
-        written(('time', *JOINTS), [f'{1000 * time:.0f}' for time in TIMES])
-    )
+    Path('ms.csv').write_text(written(times=[f'{1000 * time:.0f}' for time in TIMES]))
     table, errors = poses('ms.csv', '--chains', 'left_leg')
     assert 'taken as s, are 20 s apart; --time-unit says' in errors
     table, errors = poses('ms.csv', '--chains', 'left_leg', '--time-unit', 'ms')
@@ -185,7 +169,7 @@ def test_times_in_an_unlikely_unit_are_warned_of():
 
 
 def test_a_recording_of_one_leg_says_how_to_leave_the_other_out():
-    Path('left.csv').write_text(written(('time', *JOINTS), SECONDS))
+    Path('left.csv').write_text(written())
     table, errors = poses('left.csv')
     assert_poses_of(table, LEFT, POSITIONS)
     assert np.isnan(table['right_foot_x']).all()
