@@ -1,6 +1,7 @@
 """`leg_fk pose`: the pose of a chain's tip for one joint vector."""
 
 import argparse
+from collections.abc import Iterable
 
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.chain_text import joint_range, position
@@ -16,8 +17,6 @@ examples:
   leg_fk pose right_leg=v1 --radians 0.1 -0.2 0 -0.5 -1e-2 0 --foot-frame sole
   leg_fk pose head_imu --degrees 0 0 0 10 0 -20 --json
   leg_fk pose arm -k my_robot.yaml --degrees 90 0.25 45"""
-
-_DECIMALS = 7
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -69,11 +68,9 @@ def _as_text(
         '',
     ]
     lines += text.indented(_joints(chain, q))
-    lines += ['', 'matrix (translation in m)']
-    matrix = [_numbers(row) for row in T[:3].tolist()]
-    lines += text.indented(text.matrix([*matrix, ['0', '0', '0', '1']], '  '))
-    lines += ['', _named('position (m)', 'xyz', _numbers(T[:3, 3].tolist()))]
-    lines += [_named('quaternion  ', 'xyzw', _numbers(quaternion))]
+    lines += ['', 'matrix (translation in m)', *text.indented(text.transform(T))]
+    lines += ['', _named('position (m)', 'xyz', T[:3, 3])]
+    lines += [_named('quaternion  ', 'xyzw', quaternion)]
     for note in text.range_notes(chain, q):
         lines += ['', *text.wrapped(note)]
     return lines
@@ -91,10 +88,6 @@ def _joints(chain: Chain, q: list[float]) -> list[str]:
     return text.columns(rows)
 
 
-def _numbers(values: list[float]) -> list[str]:
-    return [text.fixed(value, _DECIMALS) for value in values]
-
-
-def _named(title: str, names: str, numbers: list[str]) -> str:
-    words = [f'{name}  {number}' for name, number in zip(names, numbers, strict=True)]
-    return '  '.join([title, *words])
+def _named(title: str, names: str, values: Iterable[float]) -> str:
+    cells = zip(names, text.numbers(values), strict=True)
+    return '  '.join([title, *(f'{name}  {number}' for name, number in cells)])

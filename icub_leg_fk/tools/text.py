@@ -9,8 +9,10 @@ from typing import Any
 from icub_leg_fk.errors import LegFKError
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.chain_text import joint_range, position, printable
+from icub_leg_fk.kinematics.rotation import Array
 
 WIDTH = 98
+DECIMALS = 7  # of a pose
 _UNLIKELY = 10.0  # m; of a joint's position, which may have been meant in mm
 _INNERMOST_LIST = re.compile(r'\[\n\s*([^][{}]*?)\n\s*\]')
 
@@ -18,6 +20,16 @@ _INNERMOST_LIST = re.compile(r'\[\n\s*([^][{}]*?)\n\s*\]')
 def fixed(value: float, decimals: int) -> str:
     """Return a number with a fixed number of decimals, without a negative zero."""
     return f'{round(value, decimals) + 0.0:.{decimals}f}'
+
+
+def numbers(values: Iterable[float], decimals: int = DECIMALS) -> list[str]:
+    """Return numbers as poses are shown."""
+    return [fixed(value, decimals) for value in values]
+
+
+def transform(T: Array) -> list[str]:
+    """Return the lines of a (4, 4) transform."""
+    return matrix([*map(numbers, T[:3]), ['0', '0', '0', '1']], '  ')
 
 
 def range_notes(chain: Chain, q: Sequence[float]) -> list[str]:

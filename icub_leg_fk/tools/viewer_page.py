@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 import html
 from importlib import import_module
@@ -315,22 +315,17 @@ def tip_texts(posed: PosedChain) -> dict[str, list[str]]:
     """Return the pose of a chain's tip in texts by title, in the numbers of `leg_fk pose`."""
     T = posed.frames[-1]
     angles = np.degrees(roll_pitch_yaw(T[:3, :3]))
-    matrix = [*map(_numbers, T[:3]), ['0', '0', '0', '1']]
+    quaternion = posed.chain.pose(posed.q)[3:]
     return {
-        'position (m)': [_named('xyz', _numbers(T[:3, 3]))],
-        'quaternion': [_named('xyzw', _numbers(posed.chain.pose(posed.q)[3:]))],
+        'position (m)': [_named('xyz', text.numbers(T[:3, 3]))],
+        'quaternion': [_named('xyzw', text.numbers(quaternion))],
         'roll, pitch, yaw (deg)': [
-            _named(('roll', 'pitch', 'yaw'), _numbers(angles, 4))
+            _named(('roll', 'pitch', 'yaw'), text.numbers(angles, 4))
         ],
-        'matrix (translation in m)': text.matrix(matrix, '  '),
+        'matrix (translation in m)': text.transform(T),
     }
 
 
-def _numbers(values: Iterable[float], decimals: int = 7) -> list[str]:
-    return [text.fixed(value, decimals) for value in values]
-
-
-def _named(names: Sequence[str], values: Sequence[str]) -> str:
-    return '  '.join(
-        f'{name} {value:>10}' for name, value in zip(names, values, strict=True)
-    )
+def _named(names: Sequence[str], numbers: Sequence[str]) -> str:
+    cells = zip(names, numbers, strict=True)
+    return '  '.join(f'{name} {number:>10}' for name, number in cells)

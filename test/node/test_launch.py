@@ -217,26 +217,18 @@ def test_a_bad_argument_is_named_in_one_line(launched, name, value):
 def test_a_misspelt_argument_is_refused_where_this_file_is_launched(
     launched, monkeypatch
 ):
-    line = [
-        'ros2',
-        'launch',
-        'icub_leg_fk',
-        'foot_poses_launch.py',
-        'rviz2:=true',
-        'verson:=v1',
-    ]
-    monkeypatch.setattr(sys, 'argv', line)
+    line = 'ros2 launch icub_leg_fk foot_poses_launch.py'.split()
+    monkeypatch.setattr(sys, 'argv', [*line, 'rviz2:=true', 'verson:=v1'])
     assert "unknown argument 'rviz2'; did you mean 'rviz'? known: chains," in launched(
         include()
     )
-    monkeypatch.setattr(sys, 'argv', [*line[:4], 'version:=v1', 'robot:=icub'])
+    monkeypatch.setattr(sys, 'argv', [*line, 'version:=v1', 'robot:=icub'])
     assert 'STARTED node' in launched(include())
 
 
 def test_a_bringup_has_arguments_of_its_own(launched, monkeypatch):
-    monkeypatch.setattr(
-        sys, 'argv', ['ros2', 'launch', 'bringup', 'robot_launch.py', 'rviz2:=1']
-    )
+    line = 'ros2 launch bringup robot_launch.py rviz2:=1'.split()
+    monkeypatch.setattr(sys, 'argv', line)
     own = {
         'param_file': '/no/such.yaml',
         'rviz2': 'please',
