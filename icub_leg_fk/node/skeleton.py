@@ -32,19 +32,36 @@ def skeleton_markers(
     """
     color = _color(chain)
     origins = [Point(), *_points(chain.frames(q)[:, :3, 3])]
-    bones = Marker(type=Marker.LINE_STRIP, points=origins, scale=_BONES, color=color)
-    joints = Marker(type=Marker.SPHERE_LIST, points=origins, scale=_JOINTS)
-    joints.color = _JOINT_COLOR
-    name = Marker(type=Marker.TEXT_VIEW_FACING, text=chain.tip, color=color)
-    name.scale = _LETTERS
+    bones = Marker(
+        type=Marker.LINE_STRIP,
+        points=origins,
+        scale=_BONES,
+        color=color,
+    )
+    joints = Marker(
+        type=Marker.SPHERE_LIST,
+        points=origins,
+        scale=_JOINTS,
+        color=_JOINT_COLOR,
+    )
+    name = Marker(
+        type=Marker.TEXT_VIEW_FACING,
+        text=chain.tip,
+        scale=_LETTERS,
+        color=color,
+    )
     tip = origins[-1]
     name.pose.position = Point(x=tip.x, y=tip.y, z=tip.z - _NAME_BELOW)
     markers = [bones, joints, name]
     corners = chain.sole_outline(q)
     if corners is not None:
         points = _points(corners)
-        sole = Marker(type=Marker.LINE_STRIP, scale=_SOLE, color=color)
-        sole.points = [*points, points[0]]
+        sole = Marker(
+            type=Marker.LINE_STRIP,
+            points=[*points, points[0]],
+            scale=_SOLE,
+            color=color,
+        )
         markers.append(sole)
     for number, marker in enumerate(markers):
         marker.header = Header(stamp=stamp, frame_id=frame_prefix + chain.root_frame)
