@@ -6,7 +6,6 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 import sys
 
-from icub_leg_fk.errors import OutputFileError
 from icub_leg_fk.tools import options
 from icub_leg_fk.tools.output_file import check_target, STANDARD_OUTPUT, whole_path
 from icub_leg_fk.tools.pose_table import (
@@ -54,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the table."""
     if args.output not in (None, STANDARD_OUTPUT):
-        _check_output(args.output, args.force)
+        check_target(args.output, force=args.force, endings=_FORMATS)
     name = Path(args.recordings[0]).name
     with (
         shown_progress(name) as progress,
@@ -92,20 +91,10 @@ def _sink(output: str | None, columns: Sequence[str], force: bool) -> Iterator[S
         yield CsvTable(sys.stdout, columns)
         return
     with whole_path(output, force=force) as place:
-        if place.suffix == '.csv':
+        if Path(output).suffix.lower() == '.csv':
             with place.open('w', encoding='utf-8') as stream:
                 yield CsvTable(stream, columns)
             return
         with closing(NpzTable(columns, place.parent)) as table:
             yield table
             table.save(place)
-
-
-def _check_output(output: str, force: bool) -> None:
-    """Refuse a file that cannot be, before any work is done for it."""
-    check_target(output, force=force)
-    ending = Path(output).suffix
-    if ending not in _FORMATS:
-        raise OutputFileError(
-            output, f'found {ending or "no ending"}, allowed: {", ".join(_FORMATS)}'
-        )

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, TYPE_CHECKING
 
-from icub_leg_fk.errors import LegFKError, MissingDependencyError, OutputFileError
+from icub_leg_fk.errors import LegFKError, MissingDependencyError
 from icub_leg_fk.kinematics import Chain
 from icub_leg_fk.kinematics.rotation import Array
 from icub_leg_fk.stream.colors import color_of
@@ -124,12 +124,7 @@ def own_settings() -> Iterator[None]:
 def check_output(path: str | Path, force: bool) -> None:
     """Refuse a picture that cannot be, before any work is done for it."""
     import_matplotlib()
-    check_target(path, force=force)
-    ending = Path(path).suffix
-    if ending.lower() not in FORMATS:
-        raise OutputFileError(
-            str(path), f'found {ending or "no ending"}, allowed: {", ".join(FORMATS)}'
-        )
+    check_target(path, force=force, endings=FORMATS)
 
 
 def save_picture(

@@ -1,6 +1,6 @@
 """Writing a file or a bag so that it is there whole or not at all."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 import os
 from pathlib import Path
@@ -48,9 +48,19 @@ def whole_path(
 
 
 def check_target(
-    path: str | Path, *, force: bool, may_replace: Callable[[Path], bool] = Path.is_file
+    path: str | Path,
+    *,
+    force: bool,
+    may_replace: Callable[[Path], bool] = Path.is_file,
+    endings: Sequence[str] = (),
 ) -> None:
     """Refuse a target that `whole_path` would refuse, before any work is done.
+
+    Args:
+        path: the target.
+        force: whether a target that exists is replaced.
+        may_replace: says whether it is of the kind.
+        endings: those that its name may have; any if there are none.
 
     Raises:
         OutputFileError: says why.
@@ -74,6 +84,10 @@ def check_target(
         ).cleanup()
     except OSError as error:
         raise _cannot_be_written(path, error) from error
+    ending = Path(path).suffix
+    if endings and ending.lower() not in endings:
+        fault = f'found {ending or "no ending"}, allowed: {", ".join(endings)}'
+        raise OutputFileError(str(path), fault)
 
 
 def _cannot_be_written(path: str | Path, error: OSError) -> OutputFileError:
