@@ -30,7 +30,9 @@ README = PAGES['README.md']
 LEG_FK = re.compile(
     r'(?:ros2 run icub_leg_fk |.*python -m icub_)?leg_fk (.*?)(?: > .*)?$'
 )
-NEEDS_ROS = re.compile(r'.*\bros2 |rosdep |colcon |\. install|python3 -m venv|~/')
+NEEDS_ROS = re.compile(
+    r'.*\bros2 |rosdep |colcon |\. install|python3 -m venv|~/|from launch '
+)
 
 
 def blocks(text, kind):
@@ -256,14 +258,13 @@ def script(page):
         r'^```(console|python)\n(.*?)^```', PAGES[page], re.DOTALL | re.MULTILINE
     )
     for kind, block in kinds:
-        if kind == 'python':
-            lines.append(f"python - <<'END'\n{block}END")
-            continue
-        for command in commands(block):
-            if NEEDS_ROS.match(command):
-                print('passed over:', command)
+        for typed in commands(block) if kind == 'console' else [block]:
+            if NEEDS_ROS.match(typed):
+                print('passed over:', typed)
+            elif kind == 'python':
+                lines.append(f"python - <<'END'\n{typed}END")
             else:
-                lines.append(until_ctrl_c(command))
+                lines.append(until_ctrl_c(typed))
     return '\n'.join(lines)
 
 
