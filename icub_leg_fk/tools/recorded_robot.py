@@ -155,33 +155,22 @@ def robot_of(
     Raises:
         InputFileError: there is no description that can be used; says why.
     """
-    named: bool | str = True
-    joints: list[str] = []
-    most = None
-    if isinstance(chains, Described):
-        named = chains.topic
-    else:
-        joints = [name for chain in chains for name in chain.joint_names]
-        most = 1  # which the tables are held against
-    sent: list[_Sent] = []
-    topics: dict[str, None] = {}
-    for bag in bags:
-        topic = (
-            named if isinstance(named, str) else _topic_of(bag, joint_topics, joints)
-        )
-        topics[topic] = None
-        messages = bag.messages(bag.connections_of(STRING, [topic]))
-        sent += [_Sent(time, topic, data) for _, time, data in islice(messages, most)]
-    sent.sort()
     if not isinstance(chains, Described):
-        return _compared(chains, sent[:most], joint_prefix)
+        joints = [name for chain in chains for name in chain.joint_names]
+        topics = [_topic_of(bag, joint_topics, joints) for bag in bags]
+        return _compared(chains, _sent(bags, topics, most=1)[:1], joint_prefix)
+    if isinstance(chains.topic, str):
+        topics = [chains.topic] * len(bags)
+    else:
+        topics = [_topic_of(bag, joint_topics) for bag in bags]
+    sent = _sent(bags, topics)
     name = ', '.join(str(bag.path) for bag in bags)
     if not sent:
         others = {topic for bag in bags for topic in bag.topics(STRING)}
         raise InputFileError(
             name,
-            f'no description of the robot on {" or ".join(topics)}; topics of type '
-            f'{STRING}: {", ".join(sorted(others)) or "none"}',
+            f'no description of the robot on {" or ".join(dict.fromkeys(topics))}; topics of '
+            f'type {STRING}: {", ".join(sorted(others)) or "none"}',
         )
     robot = _described(chains, sent, min(bag.span[0] for bag in bags))
     if not robot.periods:
@@ -197,9 +186,21 @@ class _Sent(NamedTuple):
     data: bytes
 
 
-def _topic_of(bag: Bag, joint_topics: Sequence[str], joints: Sequence[str]) -> str:
+def _topic_of(bag: Bag, joint_topics: Sequence[str], joints: Sequence[str] = ()) -> str:
+    """Return the topic of descriptions in the namespace of a bag's joint states."""
     connections = bag.joint_connections(joint_topics, joints)
     return f'{namespace_of(each.topic for each in connections)}/{_TOPIC}'
+
+
+def _sent(
+    bags: Sequence[Bag], topics: Sequence[str], most: int | None = None
+) -> list[_Sent]:
+    """Return the first descriptions on a topic of each bag, in the order of their times."""
+    sent = []
+    for bag, topic in zip(bags, topics, strict=True):
+        messages = bag.messages(bag.connections_of(STRING, [topic]))
+        sent += [_Sent(time, topic, data) for _, time, data in islice(messages, most)]
+    return sorted(sent)
 
 
 def _described(wanted: Described, sent: Sequence[_Sent], start: int) -> Robot:
