@@ -163,19 +163,7 @@ def robot_of(
         topics = [chains.topic] * len(bags)
     else:
         topics = [_topic_of(bag, joint_topics) for bag in bags]
-    sent = _sent(bags, topics)
-    name = ', '.join(str(bag.path) for bag in bags)
-    if not sent:
-        others = {topic for bag in bags for topic in bag.topics(STRING)}
-        raise InputFileError(
-            name,
-            f'no description of the robot on {" or ".join(dict.fromkeys(topics))}; topics of '
-            f'type {STRING}: {", ".join(sorted(others)) or "none"}',
-        )
-    robot = _described(chains, sent, min(bag.span[0] for bag in bags))
-    if not robot.periods:
-        raise InputFileError(name, robot.warnings[0])
-    return robot
+    return _described(chains, bags, topics)
 
 
 class _Sent(NamedTuple):
@@ -203,8 +191,25 @@ def _sent(
     return sorted(sent)
 
 
-def _described(wanted: Described, sent: Sequence[_Sent], start: int) -> Robot:
-    """Return the robot that some descriptions describe, of which the first counts from always."""
+def _described(wanted: Described, bags: Sequence[Bag], topics: Sequence[str]) -> Robot:
+    """Return the robot of the descriptions on a topic of each bag."""
+    sent = _sent(bags, topics)
+    name = ', '.join(str(bag.path) for bag in bags)
+    if not sent:
+        others = {topic for bag in bags for topic in bag.topics(STRING)}
+        raise InputFileError(
+            name,
+            f'no description of the robot on {" or ".join(dict.fromkeys(topics))}; topics of '
+            f'type {STRING}: {", ".join(sorted(others)) or "none"}',
+        )
+    robot = _periods(wanted, sent, min(bag.span[0] for bag in bags))
+    if not robot.periods:
+        raise InputFileError(name, robot.warnings[0])
+    return robot
+
+
+def _periods(wanted: Described, sent: Sequence[_Sent], start: int) -> Robot:
+    """Return what some descriptions describe; the first usable one counts from the beginning."""
     robot = Robot()
     before = b''
     for time, topic, data in sent:
