@@ -444,6 +444,11 @@ class Chain(Frozen):
         return chain_text.as_html(self)
 
 
+def solver_of(chain: Chain) -> Solver:
+    """Return what computes for joint vectors that are known to be n finite floats, unchecked."""
+    return chain._solver
+
+
 def _finite(values: Array) -> Array:
     if not np.isfinite(values).all():
         raise too_large('q')

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from icub_leg_fk.kinematics import Chain
+from icub_leg_fk.kinematics.chain import solver_of
 from icub_leg_fk.kinematics.solver import Pose
 from icub_leg_fk.stream.cdr import (
     PoseStampedEncoder,
@@ -16,6 +17,7 @@ from icub_leg_fk.stream.cdr import (
 from icub_leg_fk.stream.joint_input import Ready
 
 Send = Callable[[bytes], None]
+_Message = tuple[Send, bytes]
 
 
 class Senders(NamedTuple):
@@ -54,15 +56,22 @@ class PoseStream:
         self._tf_encoders: dict[tuple[str, ...], TFMessageEncoder] = {}
 
     def send(self, vectors: Iterable[Ready]) -> None:
-        """Send what one message has made ready."""
+        """Send what one message has made ready.
+
+        All is computed before the first message goes out, since its receiver may take the core.
+        """
+        messages: list[_Message] = []
         poses: dict[str, Pose] = {}
         for vector in vectors:
-            pose = self._outputs[vector.chain.name].send(vector)
+            pose = self._outputs[vector.chain.name].add_messages(vector, messages)
             if pose is not None:
                 poses[vector.chain.name] = pose
         if self._send_tf is not None and poses:
-            encoder = self._tf_encoder(tuple(poses))
-            self._send_tf(encoder.encode(vector.sec, vector.nanosec, [*poses.values()]))
+            encode = self._tf_encoder(tuple(poses)).encode
+            transforms = encode(vector.sec, vector.nanosec, [*poses.values()])
+            messages.append((self._send_tf, transforms))
+        for send, data in messages:
+            send(data)
 
     def _tf_encoder(self, chains: tuple[str, ...]) -> TFMessageEncoder:
         """Return what encodes the transforms of some chains into one message."""
@@ -78,20 +87,22 @@ class _Output:
     def __init__(
         self, chain: Chain, root_frame: str, senders: Senders, is_in_tf: bool
     ) -> None:
-        self._chain = chain
+        self._solver = solver_of(chain)  # the joint input has looked at the numbers
         self._send_pose, self._send_twist = senders
         self._needs_pose = is_in_tf or self._send_pose is not None
         self._encode_pose = PoseStampedEncoder(root_frame).encode
         self._encode_twist = TwistStampedEncoder(root_frame).encode
 
-    def send(self, vector: Ready) -> Pose | None:
-        """Send what a joint vector gives; return its pose, or None if nobody needs it."""
+    def add_messages(self, vector: Ready, messages: list[_Message]) -> Pose | None:
+        """Add what a joint vector gives; return its pose, or None if nobody needs it."""
         pose = None
         if self._needs_pose:
-            pose = self._chain.pose(vector.positions)
+            pose = self._solver.pose(vector.positions)
             if self._send_pose is not None:
-                self._send_pose(self._encode_pose(vector.sec, vector.nanosec, pose))
+                data = self._encode_pose(vector.sec, vector.nanosec, pose)
+                messages.append((self._send_pose, data))
         if self._send_twist is not None and vector.velocities is not None:
-            twist = self._chain.twist(vector.positions, vector.velocities)
-            self._send_twist(self._encode_twist(vector.sec, vector.nanosec, twist))
+            twist = self._solver.twist(vector.positions, vector.velocities)
+            data = self._encode_twist(vector.sec, vector.nanosec, twist)
+            messages.append((self._send_twist, data))
         return pose
