@@ -45,11 +45,9 @@ RIGID = 'a rotation (to four decimals at least), a translation and the last row 
 NAME = 'up to 300 printable characters'
 FRAME = f'{NAME}, not beginning with /'
 WORD = 'a letter, then up to 63 letters, digits and _'
-FILE, LEG, V1 = 'kinematics file', 'chain leg', 'chain leg, version v1'
 VERSION = (
     'links, T_Ro0, T_nIs, convention, source, root_frame, joints, tip_frames, root_axes'
 )
-ROW_0, ROW_1 = f'{V1}, row 0', f'{V1}, row 1'
 
 
 def refusal(path: Path) -> CatalogError:
@@ -68,111 +66,110 @@ def write(tmp_path: Path, content: str | bytes) -> Path:
 
 LONG = 200_000 * 'x'
 
-COLUMNS = ('old', 'new', 'place', 'found', 'allowed')
-# What to replace in the good file, by what, and where, what was found and what is allowed.
+# What to replace in the good file, by what; place, found and allowed of the error.
 MISTAKES = [
     (
         'length: mm',
         'length: inch',
-        f'1: {FILE}, field units, field length',
+        '1: kinematics file, field units, field length',
         "'inch'",
         'mm or m',
     ),
     (
         '{length: mm, angle: deg}',
         '{length: mm}',
-        f'1: {FILE}, field units, field angle',
+        '1: kinematics file, field units, field angle',
         'nothing',
         'all of length, angle',
     ),
     (
         '{length: mm, angle: deg}',
         'mm',
-        f'1: {FILE}, field units',
+        '1: kinematics file, field units',
         "'mm'",
         'a mapping with length, angle',
     ),
     (
         'units:',
         'unit:',
-        f'1: {FILE}',
+        '1: kinematics file',
         "unknown key 'unit' (did you mean 'units'?)",
         TOP,
     ),
     (
         GOOD[GOOD.index('chains') :],
         '',
-        f'1: {FILE}, field chains',
+        '1: kinematics file, field chains',
         'nothing',
         'all of units, chains',
     ),
     (
         GOOD[GOOD.index('chains') :],
         'chains: {}',
-        f'2: {FILE}, field chains',
+        '2: kinematics file, field chains',
         'none',
         'at least one chain',
     ),
     (
         GOOD[GOOD.index('chains') :],
         'chains: [leg]',
-        f'2: {FILE}, field chains',
+        '2: kinematics file, field chains',
         'a list',
         'chains by name',
     ),
     (
         GOOD,
         GOOD + '  leg: {}\n',
-        f'25: {LEG}',
+        '25: chain leg',
         'a duplicate key',
         'each key once',
     ),
     (
         'root_frame:',
         'root:',
-        f'5: {LEG}',
+        '5: chain leg',
         "unknown key 'root'",
         CHAIN,
     ),
     (
         'tip: foot',
         'tip: foot\n    tip: foot',
-        f'5: {LEG}, field tip',
+        '5: chain leg, field tip',
         'a duplicate key',
         'each key once',
     ),
     (
         'tip: foot',
         'tip: left foot',
-        f'4: {LEG}, field tip',
+        '4: chain leg, field tip',
         "'left foot'",
         f'a name: {WORD}',
     ),
     (
         '[hip, knee]',
         '[hip, "kn\\nee"]',
-        f'6: {LEG}, field joints',
+        '6: chain leg, field joints',
         "the text 'kn\\nee'",
         f'a joint name: {NAME}',
     ),
     (
         '[hip, knee]',
         '[hip,\n      hip]',
-        f'7: {LEG}, field joints',
+        '7: chain leg, field joints',
         'joint hip again',
         'each joint once',
     ),
     (
         '[hip, knee]',
         'hip',
-        f'6: {LEG}, field joints',
+        '6: chain leg, field joints',
         "'hip'",
         'a list of joint names',
     ),
     (
         '[hip, knee]',
         '[]',
-        f'6: {LEG}, field joints',
+        '6: chain leg, field joints',
         'an empty list',
         'a list of joint names, at least one',
     ),
@@ -186,196 +183,196 @@ MISTAKES = [
     (
         GOOD[GOOD.index('      dh') : GOOD.index('    versions')],
         '      {}\n',
-        f'8: {LEG}, field tip_frames',
+        '8: chain leg, field tip_frames',
         'none',
         'at least one tip frame',
     ),
     (
         'root_link',
         '/root_link',
-        f'5: {LEG}, field root_frame',
+        '5: chain leg, field root_frame',
         "'/root_link'",
         f'a frame id: {FRAME}',
     ),
     (
         'foot_dh',
         'root_link',
-        f'8: {LEG}, field tip_frames, dh, field frame',
+        '8: chain leg, field tip_frames, dh, field frame',
         "'root_link'",
         'another frame id than the root frame',
     ),
     (
         '{frame: foot_dh}',
         '{}',
-        f'8: {LEG}, field tip_frames, dh, field frame',
+        '8: chain leg, field tip_frames, dh, field frame',
         'nothing',
         'all of frame',
     ),
     (
         GOOD[GOOD.index('versions') :],
         'versions: {}',
-        f'12: {LEG}, field versions',
+        '12: chain leg, field versions',
         'none',
         'at least one version',
     ),
     (
         GOOD,
         GOOD + '      v1: {}\n',
-        f'25: {V1}',
+        '25: chain leg, version v1',
         'a duplicate key',
         'each key once',
     ),
     (
         'T_nIs:',
         'T_nls:',
-        f'24: {V1}',
+        '24: chain leg, version v1',
         "unknown key 'T_nls' (did you mean 'T_nIs'?)",
         VERSION,
     ),
     (
         GOOD,
         'default_version: v2\n' + GOOD,
-        f'1: {FILE}, field default_version',
+        '1: kinematics file, field default_version',
         "'v2'",
         'a version of the file: v1',
     ),
     (
         '    versions:',
         '    default_version: v2\n    versions:',
-        f'12: {LEG}, field default_version',
+        '12: chain leg, field default_version',
         "'v2'",
         'v1',
     ),
     (
         '    joints',
         '    root_axes: [forward, right, up]\n    joints',
-        f'6: {LEG}, field root_axes',
+        '6: chain leg, field root_axes',
         'forward, right, up',
         'directions of x, y, z that make a right-handed frame',
     ),
     (
         '    joints',
         '    root_axes: [north, right, up]\n    joints',
-        f'6: {LEG}, field root_axes',
+        '6: chain leg, field root_axes',
         "'north'",
         'forward or backward or left or right or up or down',
     ),
     (
         'foot_sole\n',
         'foot_sole\n        outline: [[1, 2], [3, 4]]\n',
-        f'11: {LEG}, field tip_frames, sole, field outline',
+        '11: chain leg, field tip_frames, sole, field outline',
         '2',
         'at least three corners',
     ),
     (
         'foot_sole\n',
         'foot_sole\n        outline: [[1, 2, 3]]\n',
-        f'11: {LEG}, field tip_frames, sole, field outline',
+        '11: chain leg, field tip_frames, sole, field outline',
         '3 items',
         '[x, y]',
     ),
     (
         '"somewhere"',
         '|\n          some\n          where',
-        f'14: {V1}, field source',
+        '14: chain leg, version v1, field source',
         "the text 'some\\nwhere\\n'",
         'text of one line',
     ),
     (
         '          - [0, 0, 0, 1]\n',
         '',
-        f'16: {V1}, field T_Ro0',
+        '16: chain leg, version v1, field T_Ro0',
         '3 items',
         '4 rows of 4 numbers',
     ),
     (
         '[0, -1, 0, -119.9]',
         '[0, -1, 0]',
-        f'18: {V1}, field T_Ro0, row 2',
+        '18: chain leg, version v1, field T_Ro0, row 2',
         '3 items',
         'a row of 4 numbers',
     ),
     (
         '[0, -1, 0, -119.9]',
         '[0, -1, o, -119.9]',
-        f'18: {V1}, field T_Ro0, row 2, column 2',
+        '18: chain leg, version v1, field T_Ro0, row 2, column 2',
         "'o'",
         'a finite number',
     ),
     (
         '[1, 0, 0, 5]',
         '[2, 0, 0, 5]',
-        f'16: {V1}, field T_Ro0',
+        '16: chain leg, version v1, field T_Ro0',
         'a matrix that is not a rigid transform',
         RIGID,
     ),
     (
         '[1, 0, 0, 0], [0, 0, 0, 1]]',
         '[1, 0, 0, 0], [0, 0, 1, 1]]',
-        f'11: {LEG}, field tip_frames, sole, field transform',
+        '11: chain leg, field tip_frames, sole, field transform',
         'a matrix that is not a rigid transform',
         RIGID,
     ),
     (
         GOOD[GOOD.index('          - {a: 30') : GOOD.index('          - {a: 1,')],
         '',
-        f'21: {V1}, field links',
+        '21: chain leg, version v1, field links',
         '1 row with a joint',
         '2, one per joint that no row names',
     ),
     (
         GOOD[GOOD.index('        links:') : GOOD.index('        T_nIs')],
         '        links: []\n',
-        f'20: {V1}, field links',
+        '20: chain leg, version v1, field links',
         'an empty list',
         'a list of rows, at least one',
     ),
     (
         'd: 20, ',
         '',
-        f'21: {ROW_0}, field d',
+        '21: chain leg, version v1, row 0, field d',
         'nothing',
         f'all of {DH}',
     ),
     (
         'offset: 0, type',
         'ofset: 0, type',
-        f'22: {ROW_1}',
+        '22: chain leg, version v1, row 1',
         "unknown key 'ofset' (did you mean 'offset'?)",
         ROW,
     ),
     (
         'offset: 0, type',
         'theta: 0, type',
-        f'22: {ROW_1}',
+        '22: chain leg, version v1, row 1',
         'key theta',
         'offset instead',
     ),
     (
         'offset: 90',
         'offset: 90, sign: -1',
-        f'21: {ROW_0}',
+        '21: chain leg, version v1, row 0',
         'key sign',
         'gain instead',
     ),
     (
         'offset: 90',
         'offset: 90, gain: 0',
-        f'21: {ROW_0}, field gain',
+        '21: chain leg, version v1, row 0, field gain',
         "'0'",
         'a number other than 0',
     ),
     (
         'offset: 90',
         'offset: 90, joint: kne',
-        f'21: {ROW_0}, field joint',
+        '21: chain leg, version v1, row 0, field joint',
         "'kne'",
         'hip or knee',
     ),
     (
         '{a: 1, d: 6.6',
         '{joint: hip, a: 1, d: 6.6',
-        f'23: {V1}, row 2, field joint',
+        '23: chain leg, version v1, row 2, field joint',
         "'hip'",
         'nothing, since a fixed row has no joint',
     ),
@@ -383,147 +380,147 @@ MISTAKES = [
         '{a: 1, d: 6.6, alpha: 90, offset: 0, type: fixed}',
         '{a: 1, d: 6, alpha: 90, joint: hip}\n'
         '          - {a: 1, d: 6, alpha: 90, joint: hip, range: [0, 1]}',
-        f'24: {V1}, row 3, field range',
+        '24: chain leg, version v1, row 3, field range',
         'a list',
         'nothing: the range of joint hip stands on the first row that it moves',
     ),
     (
         '{a: 30',
         '{a: 30, a: 31',
-        f'22: {ROW_1}, field a',
+        '22: chain leg, version v1, row 1, field a',
         'a duplicate key',
         'each key once',
     ),
     (
         'a: 10',
         'a: "10"',
-        f'21: {ROW_0}, field a',
+        '21: chain leg, version v1, row 0, field a',
         "the text '10'",
         NUMBER_MM,
     ),
     (
         'd: 20',
         'd: .nan',
-        f'21: {ROW_0}, field d',
+        '21: chain leg, version v1, row 0, field d',
         "'.nan'",
         NUMBER_MM,
     ),
     (
         'd: 20',
         'd: 1e999',
-        f'21: {ROW_0}, field d',
+        '21: chain leg, version v1, row 0, field d',
         "'1e999'",
         NUMBER_MM,
     ),
     (
         'a: 10',
         'a: -1e300',
-        f'21: {ROW_0}, field a',
+        '21: chain leg, version v1, row 0, field a',
         "'-1e300'",
         'a length up to 1e+09 m',
     ),
     (
         'alpha: -90',
         'alpha: 1:30',
-        f'21: {ROW_0}, field alpha',
+        '21: chain leg, version v1, row 0, field alpha',
         "'1:30'",
         NUMBER_DEG,
     ),
     (
         'alpha: -90',
         'alpha: pi/0',
-        f'21: {ROW_0}, field alpha',
+        '21: chain leg, version v1, row 0, field alpha',
         "'pi/0'",
         NUMBER_DEG,
     ),
     (
         'offset: 90',
         'offset: 90 deg',
-        f'21: {ROW_0}, field offset',
+        '21: chain leg, version v1, row 0, field offset',
         "'90 deg'",
         NUMBER_DEG,
     ),
     (
         'a: 10',
         'a: ',
-        f'21: {ROW_0}, field a',
+        '21: chain leg, version v1, row 0, field a',
         'nothing',
         NUMBER_MM,
     ),
     (
         '[-44, 132]',
         '[132, -44]',
-        f'21: {ROW_0}, field range',
+        '21: chain leg, version v1, row 0, field range',
         "'132' above '-44'",
         'lower at most upper',
     ),
     (
         '[-44, 132]',
         '132',
-        f'21: {ROW_0}, field range',
+        '21: chain leg, version v1, row 0, field range',
         "'132'",
         '[lower, upper]',
     ),
     (
         'prismatic',
         'screw',
-        f'22: {ROW_1}, field type',
+        '22: chain leg, version v1, row 1, field type',
         "'screw'",
         'revolute or prismatic or fixed',
     ),
     (
         '"odd"',
         '"odd\\neven"',
-        f'22: {ROW_1}, field erratum',
+        '22: chain leg, version v1, row 1, field erratum',
         "the text 'odd\\neven'",
         'text of one line',
     ),
     (
         '{a: 1, d: 6.6',
         '{range: [0, 1], a: 1, d: 6.6',
-        f'23: {V1}, row 2, field range',
+        '23: chain leg, version v1, row 2, field range',
         'a list',
         'nothing, since a fixed row has no joint',
     ),
     (
         '[-44, 132]',
         '[-44, 132], robot_range: [1, 0]',
-        f'21: {ROW_0}, field robot_range',
+        '21: chain leg, version v1, row 0, field robot_range',
         "'1' above '0'",
         'lower at most upper',
     ),
     (
         '        T_nIs',
         '        virtual_link: {a: 1}\n        T_nIs',
-        f'24: {V1}',
+        '24: chain leg, version v1',
         'key virtual_link',
         'a last row such as {a: 0, d: 6.6, alpha: 90, type: fixed} instead',
     ),
     (
         '        T_nIs',
         '        convention: craig\n        T_nIs',
-        f'24: {V1}, field convention',
+        '24: chain leg, version v1, field convention',
         "'craig'",
         'standard or modified',
     ),
     (
         'a: 30',
         'a: !!python/object/apply:os.system [true]',
-        f'22: {ROW_1}, field a',
+        '22: chain leg, version v1, row 1, field a',
         'a list',
         NUMBER_MM,
     ),
     (
         'a: 30',
         'a: &a [*a]',
-        f'22: {ROW_1}, field a',
+        '22: chain leg, version v1, row 1, field a',
         'a list',
         NUMBER_MM,
     ),
     (
         'a: 30',
         f'a: {LONG}',
-        f'22: {ROW_1}, field a',
+        '22: chain leg, version v1, row 1, field a',
         f"'{LONG[:27]}...{LONG[:28]}'",
         NUMBER_MM,
     ),
@@ -531,11 +528,12 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(
-    COLUMNS, MISTAKES, ids=[f'{row[2]} {row[3][:30]}' for row in MISTAKES]
+    'mistake', MISTAKES, ids=[f'{row[2]} {row[3][:30]}' for row in MISTAKES]
 )
 def test_a_mistake_is_one_line_with_place_found_and_allowed(
-    old: str, new: str, place: str, found: str, allowed: str, tmp_path: Path
+    mistake: tuple[str, ...], tmp_path: Path
 ) -> None:
+    old, new, place, found, allowed = mistake
     assert old in GOOD
     file = write(tmp_path, GOOD.replace(old, new, 1))
     error = refusal(file)
@@ -556,20 +554,12 @@ def test_the_good_file_is_read(tmp_path: Path) -> None:
         assert chain.T_root_0[0, 3] == 0.005
 
 
-@pytest.mark.parametrize(COLUMNS, [*MISTAKES[1:8:3], *MISTAKES[-3:-1]])
+@pytest.mark.parametrize('mistake', [*MISTAKES[1:8:3], *MISTAKES[-3:-1]])
 def test_a_mistake_reads_the_same_where_pyyaml_has_no_libyaml(
-    old: str,
-    new: str,
-    place: str,
-    found: str,
-    allowed: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    mistake: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(yaml_fields, 'Loader', yaml.BaseLoader)
-    test_a_mistake_is_one_line_with_place_found_and_allowed(
-        old, new, place, found, allowed, tmp_path
-    )
+    test_a_mistake_is_one_line_with_place_found_and_allowed(mistake, tmp_path)
 
 
 @pytest.mark.parametrize(
