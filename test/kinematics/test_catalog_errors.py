@@ -50,7 +50,7 @@ VERSION = (
 )
 
 
-def refusal(path: Path) -> CatalogError:
+def refusal(path):
     with pytest.raises(CatalogError) as error:
         Catalog.load(path)
     text = str(error.value)
@@ -58,7 +58,7 @@ def refusal(path: Path) -> CatalogError:
     return error.value
 
 
-def write(tmp_path: Path, content: str | bytes) -> Path:
+def write(tmp_path, content):
     file = tmp_path / 'robot.yaml'
     file.write_bytes(content if isinstance(content, bytes) else content.encode())
     return file
@@ -530,9 +530,7 @@ MISTAKES = [
 @pytest.mark.parametrize(
     'mistake', MISTAKES, ids=[f'{row[2]} {row[3][:30]}' for row in MISTAKES]
 )
-def test_a_mistake_is_one_line_with_place_found_and_allowed(
-    mistake: tuple[str, ...], tmp_path: Path
-) -> None:
+def test_a_mistake_is_one_line_with_place_found_and_allowed(mistake, tmp_path):
     old, new, place, found, allowed = mistake
     assert old in GOOD
     file = write(tmp_path, GOOD.replace(old, new, 1))
@@ -542,7 +540,7 @@ def test_a_mistake_is_one_line_with_place_found_and_allowed(
     assert (error.found, error.allowed) == (found, allowed)
 
 
-def test_the_good_file_is_read(tmp_path: Path) -> None:
+def test_the_good_file_is_read(tmp_path):
     for content in (
         GOOD,
         '\ufeff' + GOOD,
@@ -556,8 +554,8 @@ def test_the_good_file_is_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize('mistake', [*MISTAKES[1:8:3], *MISTAKES[-3:-1]])
 def test_a_mistake_reads_the_same_where_pyyaml_has_no_libyaml(
-    mistake: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    mistake, tmp_path, monkeypatch
+):
     monkeypatch.setattr(yaml_fields, 'Loader', yaml.BaseLoader)
     test_a_mistake_is_one_line_with_place_found_and_allowed(mistake, tmp_path)
 
@@ -592,16 +590,14 @@ def test_a_mistake_reads_the_same_where_pyyaml_has_no_libyaml(
     ],
     ids=range(9),
 )
-def test_what_is_no_kinematics_file_says_so(
-    content: bytes, place: str, found: str, allowed: str, tmp_path: Path
-) -> None:
+def test_what_is_no_kinematics_file_says_so(content, place, found, allowed, tmp_path):
     file = write(tmp_path, content)
     error = str(refusal(file))
     assert error.startswith(f'{file}{place}: kinematics file: found {found}')
     assert error.endswith(f', allowed: {allowed}') or not allowed
 
 
-def test_a_file_that_cannot_be_read_says_why(tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_read_says_why(tmp_path):
     missing = tmp_path / 'missing.yaml'
     assert str(refusal(missing)) == f'cannot read {missing}: no such file or directory'
     assert str(refusal(tmp_path)) == f'cannot read {tmp_path}: is a directory'
@@ -611,14 +607,14 @@ def test_a_file_that_cannot_be_read_says_why(tmp_path: Path) -> None:
     )
 
 
-def test_an_endless_file_is_not_read_to_its_end() -> None:
+def test_an_endless_file_is_not_read_to_its_end():
     zeros = Path('/dev/zero')
     if not zeros.exists():
         pytest.skip('there is no /dev/zero here')
     assert 'more than 1000000 bytes' in str(refusal(zeros))
 
 
-def test_a_small_file_that_says_very_much_by_aliases_is_refused(tmp_path: Path) -> None:
+def test_a_small_file_that_says_very_much_by_aliases_is_refused(tmp_path):
     head = GOOD[: GOOD.index('      v1:')].replace('[hip, knee]', '[hip]')
     rows = '{a: 1, d: 1, alpha: 1}, ' + '{a: 1, d: 1, alpha: 1, type: fixed}, ' * 999
     copies = ''.join(f'      v{i}: {{links: *rows}}\n' for i in range(10))
@@ -630,7 +626,7 @@ def test_a_small_file_that_says_very_much_by_aliases_is_refused(tmp_path: Path) 
 
 @settings(max_examples=100)
 @given(st.data())
-def test_a_damaged_file_is_read_or_refused_in_one_line(data: st.DataObject) -> None:
+def test_a_damaged_file_is_read_or_refused_in_one_line(data):
     """Cut pieces out, put others in: nothing but a catalog or one line comes of it."""
     content = GOOD
     for _ in range(data.draw(st.integers(1, 4))):

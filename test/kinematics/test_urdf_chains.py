@@ -29,17 +29,17 @@ needs_robots = pytest.mark.skipif(
 
 
 @pytest.fixture
-def arm(tmp_path: Path) -> Path:
+def arm(tmp_path):
     file = tmp_path / 'arm.urdf'
     file.write_text(ARM)
     return file
 
 
-def icub(name: str) -> Catalog:
+def icub(name):
     return Catalog.load(SHARED / 'data' / 'urdf' / f'{name}.urdf')
 
 
-def test_every_link_below_the_root_with_a_joint_between_is_a_chain(arm: Path) -> None:
+def test_every_link_below_the_root_with_a_joint_between_is_a_chain(arm):
     chain = load_chain('the tool [x]', file=arm)
     assert (chain.name, chain.version, chain.root_frame) == (
         'the tool [x]',
@@ -53,9 +53,7 @@ def test_every_link_below_the_root_with_a_joint_between_is_a_chain(arm: Path) ->
     assert chain.root_axes == () and chain.source == 'arm.urdf'
 
 
-def test_chains_whose_topics_would_have_one_name_are_not_used_together(
-    tmp_path: Path,
-) -> None:
+def test_chains_whose_topics_would_have_one_name_are_not_used_together(tmp_path):
     file = tmp_path / 'arm.urdf'
     file.write_text(ARM.replace('"l2"', '"the_tool__x_"'))
     with pytest.raises(
@@ -64,9 +62,7 @@ def test_chains_whose_topics_would_have_one_name_are_not_used_together(
         Catalog.load(file).select(['the tool [x]', 'the_tool__x_'])
 
 
-def test_a_tip_given_as_a_chain_is_answered_without_a_table_made(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_tip_given_as_a_chain_is_answered_without_a_table_made(tmp_path, monkeypatch):
     file = tmp_path / 'icub.urdf'
     file.write_text(urdf_text('icub', Catalog.load().select(['left_leg'])))
     monkeypatch.delattr('icub_leg_fk.kinematics.urdf_chains.chain_from_urdf')
@@ -74,7 +70,7 @@ def test_a_tip_given_as_a_chain_is_answered_without_a_table_made(
         Catalog.load(file).chain('left_foot')
 
 
-def test_another_root_may_be_named(arm: Path) -> None:
+def test_another_root_may_be_named(arm):
     assert load_chain('l2', file=arm, root='l1').joint_names == ('j1',)
     with pytest.raises(UnknownNameError, match=r"unknown link 'l9' of .*; .*known: l4"):
         Catalog.load(arm, root='l9')
@@ -82,7 +78,7 @@ def test_another_root_may_be_named(arm: Path) -> None:
     assert "is not a URDF; the root link 'base' is ignored" in catalog.warnings[0]
 
 
-def test_what_is_no_chain_says_why(arm: Path) -> None:
+def test_what_is_no_chain_says_why(arm):
     catalog = Catalog.load(arm)
     with pytest.raises(InputFileError, match="joint 'j3' is floating"):
         catalog.chain('l4')
@@ -99,7 +95,7 @@ def test_what_is_no_chain_says_why(arm: Path) -> None:
 
 @needs_robots
 @pytest.mark.parametrize('robot_name', ['iCubGenova04', 'iCubLisboa01', 'iCubNancy01'])
-def test_the_legs_go_by_their_names_with_both_frames(robot_name: str) -> None:
+def test_the_legs_go_by_their_names_with_both_frames(robot_name):
     catalog = icub(robot_name)
     assert (
         list(catalog.chains)[:3]
@@ -125,7 +121,7 @@ def test_the_legs_go_by_their_names_with_both_frames(robot_name: str) -> None:
 
 
 @needs_robots
-def test_an_icub_3_has_only_its_soles() -> None:
+def test_an_icub_3_has_only_its_soles():
     catalog = icub('iCubGenova09')
     leg = catalog.chain('left_leg')
     assert (leg.frame, leg.frame_id, leg.tip) == ('sole', 'l_sole', 'left_foot')
@@ -138,7 +134,7 @@ def test_an_icub_3_has_only_its_soles() -> None:
 
 
 @needs_robots
-def test_a_root_that_is_not_the_shipped_one_has_no_shipped_chains() -> None:
+def test_a_root_that_is_not_the_shipped_one_has_no_shipped_chains():
     file = SHARED / 'data' / 'urdf' / 'iCubGenova04.urdf'
     catalog = Catalog.load(file, root='l_hip_1')
     assert not catalog.known() and 'left_leg' not in catalog.chains
@@ -146,7 +142,7 @@ def test_a_root_that_is_not_the_shipped_one_has_no_shipped_chains() -> None:
 
 
 @needs_robots
-def test_tables_are_tidied_for_people_on_request() -> None:
+def test_tables_are_tidied_for_people_on_request():
     file = SHARED / 'data' / 'urdf' / 'iCubNancy01.urdf'
     exact, tidied = (
         Catalog.load(file, tolerance=tolerance).chain('left_leg')
@@ -160,7 +156,7 @@ def test_tables_are_tidied_for_people_on_request() -> None:
 
 
 @needs_robots
-def test_a_catalog_of_a_urdf_is_a_value() -> None:
+def test_a_catalog_of_a_urdf_is_a_value():
     catalog = icub('iCubGenova04')
     again = pickle.loads(pickle.dumps(catalog))
     assert again == catalog and again.chain('l_sole') == catalog.chain('l_sole')
@@ -169,7 +165,7 @@ def test_a_catalog_of_a_urdf_is_a_value() -> None:
     )
 
 
-def test_degrees_in_a_urdf_are_computed_and_reported(tmp_path: Path) -> None:
+def test_degrees_in_a_urdf_are_computed_and_reported(tmp_path):
     file = tmp_path / 'arm.urdf'
     file.write_text(
         robot([joint(0, rpy='-90 0 0'), joint(1)])
@@ -192,6 +188,6 @@ def test_degrees_in_a_urdf_are_computed_and_reported(tmp_path: Path) -> None:
 
 
 @needs_robots
-def test_no_real_robot_is_doubted() -> None:
+def test_no_real_robot_is_doubted():
     for file in (SHARED / 'data' / 'urdf').glob('*.urdf'):
         assert Catalog.load(file).warnings == ()
