@@ -137,14 +137,7 @@ def test_loaded_tables_are_the_printed_ones_in_metres_and_radians(name, version)
 def test_errata_stand_beside_the_printed_ranges_of_the_documented_legs():
     for name, version in LEGS:
         errata = [link.erratum for link in CATALOG.chain(name, version).links]
-        assert [bool(erratum) for erratum in errata] == [
-            False,
-            True,
-            False,
-            False,
-            True,
-            False,
-        ]
+        assert [i for i, erratum in enumerate(errata) if erratum] == [1, 4]
         assert 'sign' in errata[1] and 'narrower' in errata[4]
 
 
@@ -211,11 +204,6 @@ def test_the_files_default_versions_count_where_none_is_given():
         == load_chain('left_leg', 'v1').version
         == 'v1'
     )
-    assert [chain.version for chain in CATALOG.select(CATALOG.chains)] == [
-        'v2_5',
-        'v2_5',
-        'v2',
-    ]
 
 
 @pytest.mark.parametrize(
@@ -264,10 +252,8 @@ chains:
 """
 
 
-def test_any_robot_can_be_read_in_metres_and_radians(tmp_path):
-    file = tmp_path / 'crane.yaml'
-    file.write_text(OWN)
-    chain = Catalog.load(file).chain('crane', 'small')
+def test_any_robot_can_be_read_in_metres_and_radians(written):
+    chain = Catalog.load(written(OWN)).chain('crane', 'small')
     assert [(link.a, link.d, link.alpha, link.offset) for link in chain.links] == [
         (0, 10, pi / 2, pi / 2),
         (0.5, -2, 0, 0),

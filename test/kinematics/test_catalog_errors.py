@@ -58,12 +58,6 @@ def refusal(path):
     return error.value
 
 
-def write(tmp_path, content):
-    file = tmp_path / 'robot.yaml'
-    file.write_bytes(content if isinstance(content, bytes) else content.encode())
-    return file
-
-
 LONG = 200_000 * 'x'
 
 # What to replace in the good file, by what; place, found and allowed of the error.
@@ -530,34 +524,34 @@ MISTAKES = [
 @pytest.mark.parametrize(
     'mistake', MISTAKES, ids=[f'{row[2]} {row[3][:30]}' for row in MISTAKES]
 )
-def test_a_mistake_is_one_line_with_place_found_and_allowed(mistake, tmp_path):
+def test_a_mistake_is_one_line_with_place_found_and_allowed(mistake, written):
     old, new, place, found, allowed = mistake
     assert old in GOOD
-    file = write(tmp_path, GOOD.replace(old, new, 1))
+    file = written(GOOD.replace(old, new, 1))
     error = refusal(file)
     assert str(error) == f'{file}:{place}: found {found}, allowed: {allowed}'
     assert f'{error.line}: {error.where}' == place
     assert (error.found, error.allowed) == (found, allowed)
 
 
-def test_the_good_file_is_read(tmp_path):
+def test_the_good_file_is_read(written):
     for content in (
         GOOD,
         '\ufeff' + GOOD,
         GOOD.replace('\n', '\r\n'),
         '--- # one\n' + GOOD,
     ):
-        chain = Catalog.load(write(tmp_path, content)).chain('leg', 'v1', 'sole')
+        chain = Catalog.load(written(content)).chain('leg', 'v1', 'sole')
         assert [link.d for link in chain.links] == [0.02, 0.04, 0.0066]
         assert chain.T_root_0[0, 3] == 0.005
 
 
 @pytest.mark.parametrize('mistake', [*MISTAKES[1:8:3], *MISTAKES[-3:-1]])
 def test_a_mistake_reads_the_same_where_pyyaml_has_no_libyaml(
-    mistake, tmp_path, monkeypatch
+    mistake, written, monkeypatch
 ):
     monkeypatch.setattr(yaml_fields, 'Loader', yaml.BaseLoader)
-    test_a_mistake_is_one_line_with_place_found_and_allowed(mistake, tmp_path)
+    test_a_mistake_is_one_line_with_place_found_and_allowed(mistake, written)
 
 
 @pytest.mark.parametrize(
@@ -590,8 +584,8 @@ def test_a_mistake_reads_the_same_where_pyyaml_has_no_libyaml(
     ],
     ids=range(9),
 )
-def test_what_is_no_kinematics_file_says_so(content, place, found, allowed, tmp_path):
-    file = write(tmp_path, content)
+def test_what_is_no_kinematics_file_says_so(content, place, found, allowed, written):
+    file = written(content)
     error = str(refusal(file))
     assert error.startswith(f'{file}{place}: kinematics file: found {found}')
     assert error.endswith(f', allowed: {allowed}') or not allowed
@@ -614,13 +608,11 @@ def test_an_endless_file_is_not_read_to_its_end():
     assert 'more than 1000000 bytes' in str(refusal(zeros))
 
 
-def test_a_small_file_that_says_very_much_by_aliases_is_refused(tmp_path):
+def test_a_small_file_that_says_very_much_by_aliases_is_refused(written):
     head = GOOD[: GOOD.index('      v1:')].replace('[hip, knee]', '[hip]')
     rows = '{a: 1, d: 1, alpha: 1}, ' + '{a: 1, d: 1, alpha: 1, type: fixed}, ' * 999
     copies = ''.join(f'      v{i}: {{links: *rows}}\n' for i in range(10))
-    error = refusal(
-        write(tmp_path, f'{head}      v: {{links: &rows [{rows}]}}\n{copies}')
-    )
+    error = refusal(written(f'{head}      v: {{links: &rows [{rows}]}}\n{copies}'))
     assert (error.found, error.allowed) == ('too many rows', 'at most 10000 in a file')
 
 

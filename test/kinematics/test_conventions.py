@@ -173,10 +173,8 @@ chains:
 
 
 @pytest.fixture
-def arm(tmp_path):
-    file = tmp_path / 'arm.yaml'
-    file.write_text(ARM)
-    return file
+def arm(written):
+    return written(ARM)
 
 
 def test_fractions_of_pi_are_exact_and_a_gain_turns_a_joint_around(arm):
@@ -264,9 +262,8 @@ def test_what_can_hardly_be_meant_is_computed_and_reported(arm):
         ('m, angle: rad', 'a: 1, d: 0, alpha: 1.55', ''),
     ],
 )
-def test_a_table_in_another_unit_is_doubted(units, row, doubt, tmp_path):
-    file = tmp_path / 'arm.yaml'
-    file.write_text(
+def test_a_table_in_another_unit_is_doubted(units, row, doubt, written):
+    file = written(
         f'units: {{length: {units}}}\nchains:\n  arm:\n    tip: tool\n'
         '    root_frame: base\n    joints: [j]\n    tip_frames: {dh: {frame: t}}\n'
         f'    versions: {{v1: {{links: [{{{row}}}]}}}}\n'
@@ -281,11 +278,11 @@ def test_three_decimals_are_too_few_for_a_rotation(arm):
         Catalog.load(arm)
 
 
-def test_two_catalogs_of_one_table_are_equal_whatever_their_path(arm, tmp_path):
-    (tmp_path / 'copy.yaml').write_text(ARM.replace('d: 0.2', 'd: 0.20'))
-    one, two = Catalog.load(arm), Catalog.load(tmp_path / 'copy.yaml')
+def test_two_catalogs_of_one_table_are_equal_whatever_their_path(arm, written):
+    copy = written(ARM.replace('d: 0.2', 'd: 0.20'), 'copy')
+    one, two = Catalog.load(arm), Catalog.load(copy)
     assert one == two and hash(one) == hash(two) and Catalog.load() == Catalog.load()
-    (tmp_path / 'copy.yaml').write_text(ARM.replace('d: 0.2', 'd: 0.21'))
-    assert Catalog.load(tmp_path / 'copy.yaml') != one
+    copy.write_text(ARM.replace('d: 0.2', 'd: 0.21'))
+    assert Catalog.load(copy) != one
     with pytest.raises(ValueError, match='read-only'):
         one.entry('arm').versions['v1'].T_root_0[0, 3] = 1.0

@@ -41,10 +41,8 @@ chains:
 
 
 @pytest.fixture
-def finger(tmp_path):
-    file = tmp_path / 'finger.yaml'
-    file.write_text(FINGER)
-    return Catalog.load(file)
+def finger(written):
+    return Catalog.load(written(FINGER))
 
 
 def test_rows_follow_the_joints_that_they_name(finger):
@@ -81,13 +79,10 @@ def test_what_is_not_said_is_zero_and_the_identity(finger):
     assert finger.chain('finger', 'large').T_root_0[0, 3] == 0.005
 
 
-def test_a_default_is_the_chains_own_the_files_or_the_only_version(finger, tmp_path):
+def test_a_default_is_the_chains_own_the_files_or_the_only_version(finger, written):
     assert finger.chain('finger').version == 'small'
     assert finger.chain('thumb').version == 'only'
-    file = tmp_path / 'own.yaml'
-    file.write_text(
-        FINGER.replace('  finger:', '  finger:\n    default_version: large')
-    )
+    file = written(FINGER.replace('  finger:', '  finger:\n    default_version: large'))
     assert load_chain('finger', file=file).version == 'large'
     file.write_text(FINGER.replace('default_version: small', ''))
     with pytest.raises(VersionNeededError) as error:
@@ -112,20 +107,17 @@ def test_outlines_are_shared_by_an_alias(finger):
         )
 
 
-def test_names_are_any_text(finger, tmp_path):
+def test_names_are_any_text(finger, written):
     assert finger.chain('finger').frame_id == 'the pad [left]'
-    file = tmp_path / 'named.yaml'
     text = FINGER.replace('  thumb:', '  "the thumb=left, möglichst":')
-    file.write_text(text.replace('only:', '"2.5 new":'), encoding='utf-8')
-    catalog = Catalog.load(file)
+    catalog = Catalog.load(written(text.replace('only:', '"2.5 new":')))
     assert catalog.chain('the thumb=left, möglichst').version == '2.5 new'
     assert catalog.chain('the thumb=left, möglichst=2.5 new').version == '2.5 new'
     assert catalog.chain('finger=large').version == 'large'
 
 
-def test_the_scoped_names_of_simulators_are_read(tmp_path):
-    file = tmp_path / 'scoped.yaml'
-    file.write_text("""
+def test_the_scoped_names_of_simulators_are_read(written):
+    file = written("""
 units: {length: m, angle: deg}
 chains:
   arm:

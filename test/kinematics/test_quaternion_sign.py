@@ -21,11 +21,9 @@ CHAINS = [
 
 
 def flips(chain, Q):
-    """Count the steps at which a quaternion turns into its negative, in `pose` and `poses`."""
-    one_by_one = np.array([chain.pose(q) for q in Q.tolist()])[:, 3:]
-    together = chain.poses(Q)[:, 3:]
-    assert (np.sum(one_by_one * together, axis=1) > 0).all()
-    return int((np.sum(together[1:] * together[:-1], axis=1) < 0).sum())
+    """Count the steps at which a quaternion turns into its negative."""
+    quaternions = chain.poses(Q)[:, 3:]
+    return int((np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0).sum())
 
 
 def check_walk(names, positions, frame):

@@ -29,10 +29,8 @@ needs_robots = pytest.mark.skipif(
 
 
 @pytest.fixture
-def arm(tmp_path):
-    file = tmp_path / 'arm.urdf'
-    file.write_text(ARM)
-    return file
+def arm(written):
+    return written(ARM, 'arm.urdf')
 
 
 def icub(name):
@@ -53,18 +51,16 @@ def test_every_link_below_the_root_with_a_joint_between_is_a_chain(arm):
     assert chain.root_axes == () and chain.source == 'arm.urdf'
 
 
-def test_chains_whose_topics_would_have_one_name_are_not_used_together(tmp_path):
-    file = tmp_path / 'arm.urdf'
-    file.write_text(ARM.replace('"l2"', '"the_tool__x_"'))
+def test_chains_whose_topics_would_have_one_name_are_not_used_together(written):
+    file = written(ARM.replace('"l2"', '"the_tool__x_"'))
     with pytest.raises(
         LegFKError, match=r'chains the tool \[x\] and the_tool__x_ do not go'
     ):
         Catalog.load(file).select(['the tool [x]', 'the_tool__x_'])
 
 
-def test_a_tip_given_as_a_chain_is_answered_without_a_table_made(tmp_path, monkeypatch):
-    file = tmp_path / 'icub.urdf'
-    file.write_text(urdf_text('icub', Catalog.load().select(['left_leg'])))
+def test_a_tip_given_as_a_chain_is_answered_without_a_table_made(written, monkeypatch):
+    file = written(urdf_text('icub', Catalog.load().select(['left_leg'])))
     monkeypatch.delattr('icub_leg_fk.kinematics.urdf_chains.chain_from_urdf')
     with pytest.raises(UnknownNameError, match='left_foot is the tip of left_leg'):
         Catalog.load(file).chain('left_foot')
@@ -165,9 +161,8 @@ def test_a_catalog_of_a_urdf_is_a_value():
     )
 
 
-def test_degrees_in_a_urdf_are_computed_and_reported(tmp_path):
-    file = tmp_path / 'arm.urdf'
-    file.write_text(
+def test_degrees_in_a_urdf_are_computed_and_reported(written):
+    file = written(
         robot([joint(0, rpy='-90 0 0'), joint(1)])
         .replace('"-2"', '"-180"')
         .replace('"2"', '"180"')

@@ -125,21 +125,20 @@ def test_what_lxml_would_have_to_guess_is_refused_with_its_line(kind):
 @pytest.mark.parametrize(
     'around', ['String value is: {}\n', '{}\n---\n', 'data: {}\n---\n']
 )
-def test_what_ros_2_prints_of_a_description_is_read(around, tmp_path):
+def test_what_ros_2_prints_of_a_description_is_read(around, written):
     text = PLAIN.replace('><', '>\n  <')
     shown = (
         yaml.safe_dump(text, width=10**6).rstrip('.\n') if 'data' in around else text
     )
     assert parse(around.format(shown)) == parse(PLAIN)
-    file = tmp_path / 'description.txt'
-    file.write_text(around.format(shown))
+    file = written(around.format(shown))
     assert Catalog.load(file).chain('l2').version == 'urdf'
 
 
-def test_a_description_that_ros_2_has_cut_off_is_refused_with_the_way(tmp_path):
-    file = tmp_path / 'description.txt'
+def test_a_description_that_ros_2_has_cut_off_is_refused_with_the_way(written):
     for start in ('', '<?xml version="1.0" ?>\n<!-- ' + 'made by xacro ' * 20 + '-->'):
-        file.write_text(f'data: {yaml.safe_dump((start + PLAIN)[:128] + "...")}---\n')
+        shown = yaml.safe_dump((start + PLAIN)[:128] + '...')
+        file = written(f'data: {shown}---\n')
         with pytest.raises(
             InputFileError, match=r'is cut off; .* --full-length /robot_descr'
         ):
