@@ -97,7 +97,7 @@ def check(file, urdf, oracle, tip):
             file,
             tip,
         )
-    assert max(max(abs(link.a), abs(link.d)) for link in chain.links) < 10, (file, tip)
+    assert longest(chain) < 10, (file, tip)
 
 
 @pytest.mark.parametrize('tip', ['l_sole', 'r_foot_dh_frame', 'imu_frame', 'l_hand'])
@@ -138,6 +138,16 @@ def test_every_chain_of_every_example_robot_is_pinocchios():
 
 def load(text):
     return Urdf.parse(text.encode(), 'robot.urdf')
+
+
+def table(*joints):
+    """Return the chain that some joints make, from the first link to the last."""
+    return chain_from_urdf(load(robot(joints)), 'l0', f'l{len(joints)}')
+
+
+def longest(chain):
+    """Return the largest a or d of a chain [m]."""
+    return max(max(abs(link.a), abs(link.d)) for link in chain.links)
 
 
 NUMBERS = st.one_of(st.sampled_from([0.0, 0.1, -0.25]), st.floats(-0.5, 0.5))
@@ -198,8 +208,7 @@ def test_any_robot_is_its_urdf_multiplied_out_and_never_kilometres_long(text):
     for chain in (exact, as_modified(exact)):
         assert np.abs(chain.forward(positions) - expected).max() < EXACT
     assert np.abs(tidied.forward(positions) - expected).max() < 100 * TIDY
-    for link in (*exact.links, *tidied.links):
-        assert max(abs(link.a), abs(link.d)) < 10
+    assert max(longest(exact), longest(tidied)) < 10
 
 
 @given(random_robots())
@@ -227,7 +236,7 @@ def test_axes_that_truly_are_a_little_apart_get_a_fixed_row():
     )
     chain = chain_from_urdf(urdf, 'l0', 'l3', tolerance=TIDY)
     assert [link.joint_type for link in chain.links].count('fixed') == 2
-    assert max(max(abs(link.a), abs(link.d)) for link in chain.links) < 1
+    assert longest(chain) < 1
     found = difference(
         chain.forward, partial(urdf.forward, 'l0', 'l3'), postures(chain, 50)
     )
@@ -263,12 +272,8 @@ def test_a_tidied_table_has_right_angles_parallel_axes_and_no_nanometres():
 
 def test_opposed_parallel_axes_are_told_from_equal_ones():
     """In OpenRAVE they are not (its issue 366)."""
-    urdf = load(
-        robot(
-            [joint(0), joint(1, xyz='0.3 0 0', axis='0 0 -1'), joint(2, xyz='0.3 0 0')]
-        )
-    )
-    chain = chain_from_urdf(urdf, 'l0', 'l3')
+    opposed = joint(1, xyz='0.3 0 0', axis='0 0 -1')
+    chain = table(joint(0), opposed, joint(2, xyz='0.3 0 0'))
     assert np.degrees([link.alpha for link in chain.links[:2]]) == pytest.approx(
         [180, 180]
     )
@@ -277,13 +282,11 @@ def test_opposed_parallel_axes_are_told_from_equal_ones():
 
 def test_a_joint_without_bounds_has_no_range():
     bounds = 'lower="-2" upper="2" '
-    chain = chain_from_urdf(
-        load(robot([joint(0).replace(bounds, ''), joint(1)])), 'l0', 'l2'
-    )
+    chain = table(joint(0).replace(bounds, ''), joint(1))
     assert chain.lower == pytest.approx([-np.inf, -2])
     assert chain.upper == pytest.approx([np.inf, 2])
     one = joint(0).replace('lower="-2" ', '')  # of which the default is 0
-    assert chain_from_urdf(load(robot([one])), 'l0', 'l1').lower == pytest.approx([0])
+    assert table(one).lower == pytest.approx([0])
 
 
 def test_what_is_not_on_the_way_may_be_nonsense():
@@ -294,7 +297,7 @@ def test_what_is_not_on_the_way_may_be_nonsense():
 
 def test_an_origin_may_have_a_quaternion():
     turned = joint(0, xyz='0.1 0 0').replace('rpy="0 0 0"', 'quat_xyzw="0 2 0 2"')
-    chain = chain_from_urdf(load(robot([turned, joint(1, xyz='0 0 0.3')])), 'l0', 'l2')
+    chain = table(turned, joint(1, xyz='0 0 0.3'))
     assert chain.forward([0, 0])[:3, 3] == pytest.approx([0.4, 0, 0])
 
 
@@ -309,8 +312,7 @@ def test_rows_follow_what_a_joint_mimics_even_by_another():
     still = joint(
         3, 'prismatic', more='<mimic joint="j0" multiplier="0" offset="0.7"/>'
     )
-    urdf = load(robot([first, follower, middle, still, last]))
-    chain = chain_from_urdf(urdf, 'l0', 'l5')
+    chain = table(first, follower, middle, still, last)
     assert chain.joint_names == ('j0', 'j4')
     assert [(row.joint, row.link.gain) for row in chain.rows()] == [
         ('j0', 1),
@@ -339,9 +341,7 @@ def test_every_repr_fits_a_line():
 
 def test_a_joint_may_follow_one_that_only_messages_have():
     """As robot_state_publisher moves it."""
-    chain = chain_from_urdf(
-        load(robot([joint(0, more='<mimic joint="elsewhere"/>'), joint(1)])), 'l0', 'l2'
-    )
+    chain = table(joint(0, more='<mimic joint="elsewhere"/>'), joint(1))
     assert chain.joint_names == ('elsewhere', 'j1') and chain.upper[0] == np.inf
 
 
