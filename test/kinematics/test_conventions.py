@@ -74,16 +74,14 @@ def largest_length(model):
     return max(1.0, *(abs(float(link.a)) + abs(float(link.d)) for link in model.links))
 
 
-def test_the_models_of_roboticstoolbox_are_computed_exactly(tmp_path):
+def test_the_models_of_roboticstoolbox_are_computed_exactly(written):
     found = models()
     modified = [name for name, model in found.items() if model.mdh]
     sliding = [name for name, model in found.items() if any(model.prismaticjoints)]
     assert len(found) >= 20 and modified and sliding
     rng = np.random.default_rng(20)
     for name, model in found.items():
-        file = tmp_path / f'{name}.yaml'
-        file.write_text(as_yaml(model))
-        chain = Catalog.load(file).chain('robot')
+        chain = Catalog.load(written(as_yaml(model))).chain('robot')
         allowed = TOLERANCE * largest_length(model)
         for q in rng.uniform(-3, 3, (6, chain.n)):
             frames = np.array([T.A for T in model.fkine_all(q)])

@@ -13,7 +13,7 @@ import pytest
 from support.robots import joint, robot
 
 ROOT = Path(__file__).resolve().parents[2]
-SHARED = ROOT.parent / 'shared'
+URDFS = ROOT.parent / 'shared' / 'data' / 'urdf'
 ARM = robot(
     [
         joint(0),
@@ -24,7 +24,7 @@ ARM = robot(
 ).replace('l3"', 'the tool [x]"')
 
 needs_robots = pytest.mark.skipif(
-    not (SHARED / 'data' / 'urdf').is_dir(), reason='../shared has the URDFs of iCubs'
+    not URDFS.is_dir(), reason='../shared has the URDFs of iCubs'
 )
 
 
@@ -33,8 +33,8 @@ def arm(written):
     return written(ARM, 'arm.urdf')
 
 
-def icub(name):
-    return Catalog.load(SHARED / 'data' / 'urdf' / f'{name}.urdf')
+def icub(name, **options):
+    return Catalog.load(URDFS / f'{name}.urdf', **options)
 
 
 def test_every_link_below_the_root_with_a_joint_between_is_a_chain(arm):
@@ -131,19 +131,15 @@ def test_an_icub_3_has_only_its_soles():
 
 @needs_robots
 def test_a_root_that_is_not_the_shipped_one_has_no_shipped_chains():
-    file = SHARED / 'data' / 'urdf' / 'iCubGenova04.urdf'
-    catalog = Catalog.load(file, root='l_hip_1')
+    catalog = icub('iCubGenova04', root='l_hip_1')
     assert not catalog.known() and 'left_leg' not in catalog.chains
     assert catalog.chain('l_sole').n < 6
 
 
 @needs_robots
 def test_tables_are_tidied_for_people_on_request():
-    file = SHARED / 'data' / 'urdf' / 'iCubNancy01.urdf'
-    exact, tidied = (
-        Catalog.load(file, tolerance=tolerance).chain('left_leg')
-        for tolerance in (0.0, TIDY)
-    )
+    exact = icub('iCubNancy01').chain('left_leg')
+    tidied = icub('iCubNancy01', tolerance=TIDY).chain('left_leg')
     offsets = np.degrees([link.offset for link in tidied.links])
     assert offsets == pytest.approx([0, 90, -90, 90, 0, 0], abs=1e-12)
     assert (
@@ -184,5 +180,5 @@ def test_degrees_in_a_urdf_are_computed_and_reported(written):
 
 @needs_robots
 def test_no_real_robot_is_doubted():
-    for file in (SHARED / 'data' / 'urdf').glob('*.urdf'):
+    for file in URDFS.glob('*.urdf'):
         assert Catalog.load(file).warnings == ()
