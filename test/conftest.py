@@ -58,3 +58,15 @@ def pytest_make_collect_report(collector):
             1,
             f'Skipped: needs {missing[1]} of ROS 2',
         )
+
+
+@pytest.fixture
+def written(tmp_path):
+    """Return what writes a text, or bytes, to a file and returns its path."""
+
+    def write(content, name='robot'):
+        file = tmp_path / name
+        file.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return file
+
+    return write

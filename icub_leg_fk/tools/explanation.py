@@ -279,16 +279,13 @@ def _frames(
     chain: Chain, q: Sequence[float] | Array, placed: Sequence[_Placed]
 ) -> dict[str, Array]:
     """Return all frames in the root frame by name, with their origins in mm."""
-    *frames, _ = chain.frames(q)
-    for frame in placed:
-        frames.append(frames[-1] @ frame.T)
-    for T in frames:
+    *of_table, T = chain.frames(q)[:-1]
+    frames = {str(i): frame for i, frame in enumerate([*of_table, T])}
+    for after in placed:
+        T = frames[after.name] = T @ after.T
+    for T in frames.values():
         T[:3, 3] *= MM
-    names = [
-        *map(str, range(len(frames) - len(placed))),
-        *(frame.name for frame in placed),
-    ]
-    return dict(zip(names, frames, strict=True))
+    return frames
 
 
 def _constant(T: Array, numbers: Numbers) -> Matrix:

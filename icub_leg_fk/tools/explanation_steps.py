@@ -34,6 +34,7 @@ sin theta_i cos alpha_i |  cos theta_i cos alpha_i | -sin alpha_i | -d_i sin alp
 sin theta_i sin alpha_i |  cos theta_i sin alpha_i |  cos alpha_i |  d_i cos alpha_i
 0                       |  0                       |  0           |  1""",
 }
+_ENTRIES = 'r_11 r_21 r_31 r_12 r_22 r_32 r_13 r_23 r_33 p_x p_y p_z'.split()
 _DEGREE = math.degrees(1)  # per radian
 _PARAMETERS = {
     'Rz': 'theta',
@@ -98,12 +99,8 @@ class Entries:
 
     def by_name(self) -> list[tuple[str, Cell]]:
         """Return the names of the entries with the entries, column by column."""
-        names = [f'r_{i}{j}' for j in (1, 2, 3) for i in (1, 2, 3)] + [
-            'p_x',
-            'p_y',
-            'p_z',
-        ]
-        return list(zip(names, np.array(self.T)[:3].T.ravel().tolist(), strict=True))
+        cells = np.array(self.T)[:3].T.ravel().tolist()
+        return list(zip(_ENTRIES, cells, strict=True))
 
 
 Block = Heading | Sentence | Remark | Table | Equation | Entries

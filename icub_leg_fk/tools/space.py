@@ -190,23 +190,18 @@ class Space:
     def _fitting_axes(self, figure: Figure, points: Array) -> Any:
         """Return axes in which (N, 3) points fill the box, but for its margin."""
         box = self._box
-        width, height = figure.get_size_inches()
-        rectangle = (
-            box.left / width,
-            box.bottom / height,
-            box.width / width,
-            box.height / height,
-        )
         seen = self._seen(points)
         lowest, highest = seen.min(axis=0), seen.max(axis=0)
-        room = np.array([box.width, box.height]) - 2 * _MARGIN
+        room = np.array(box[2:]) - 2 * _MARGIN
         self._scale = scale = float((room / (highest - lowest)).min())  # inches per m
-        half = np.array([box.width, box.height]) / scale / 2
-        self._corner = corner = (lowest + highest) / 2 - half
-        axes = figure.add_axes(rectangle)
+        half = np.array(box[2:]) / scale / 2
+        self._corner = (lowest + highest) / 2 - half
+        left_right, bottom_top = zip(self._corner, self._corner + 2 * half)
+        size = figure.get_size_inches()
+        axes = figure.add_axes(np.divide(box, (*size, *size)).tolist())
         axes.set_axis_off()
-        axes.set_xlim(corner[0], corner[0] + 2 * half[0])
-        axes.set_ylim(corner[1], corner[1] + 2 * half[1])
+        axes.set_xlim(left_right)
+        axes.set_ylim(bottom_top)
         return axes
 
     def _draw_floor(self, lines: Sequence[Array]) -> None:

@@ -144,11 +144,14 @@ class _Model:
             multiplier = repr(joint.link.gain)
             ET.SubElement(element, 'mimic', joint=joint.mimicked, multiplier=multiplier)
         if is_limited:
-            limit = ET.SubElement(
-                element, 'limit', lower=repr(lower), upper=repr(upper)
+            ET.SubElement(
+                element,
+                'limit',
+                lower=repr(lower),
+                upper=repr(upper),
+                effort=_PLACEHOLDER,
+                velocity=_PLACEHOLDER,
             )
-            limit.set('effort', _PLACEHOLDER)
-            limit.set('velocity', _PLACEHOLDER)
         body = ET.SubElement(self._robot, 'link', name=_link_name(name))
         _draw(body, 'joint', 'sphere', radius=_JOINT_RADIUS)
         _draw_bone(body, joint.link.transform())

@@ -56,7 +56,6 @@ class Recording:
             self._speeds = gui.add_dropdown('speed', _SPEEDS, initial_value=self._speed)
             self._button = gui.add_button('play')
         self._play(self.is_moving)
-        self._shown = self._line.value
         self._line.on_update(changed)
         self._button.on_click(press)
 
@@ -65,7 +64,7 @@ class Recording:
         now = time.monotonic()
         passed, self._stepped = now - self._stepped, now
         self._speed = self._speeds.value
-        if self._line.value != self._shown:
+        if self._line.value != self._at:
             self._at = float(self._line.value)
             self._play(False)
         elif self.is_moving:
@@ -76,7 +75,7 @@ class Recording:
             self._play(not self.is_moving)
         elif self._at >= self._end:
             self._play(False)
-        self._shown = self._line.value = self._at
+        self._line.value = self._at
         return [posture_at(self._at, *samples) for samples in self._present()]
 
     def _present(self) -> list[Samples]:

@@ -168,12 +168,10 @@ def test_the_head_sensors_transform_is_the_fixed_row_of_its_document():
         ('0', 'arm.urdf'),
     ],
 )
-def test_of_a_urdf_the_tidied_table_is_shown_and_what_that_costs(
-    tilt, source, tmp_path
-):
-    file = tmp_path / 'arm.urdf'
+def test_of_a_urdf_the_tidied_table_is_shown_and_what_that_costs(tilt, source, written):
     joints = [joint(0), joint(1, xyz='0.3 0 0', rpy=f'{tilt} 0 0')]
-    file.write_text(robot([*joints, joint(2, 'fixed', xyz='0.5 0 0')]))
+    text = robot([*joints, joint(2, 'fixed', xyz='0.5 0 0')])
+    file = written(text, 'arm.urdf')
     text = ' '.join(explain('l3', '-k', file, '--degrees', 10, 20).split())
     assert 'i = 0 300 0 0 0 + (-114.5916 -> +114.5916) j0' in text
     assert f'Table from: {source}' in text

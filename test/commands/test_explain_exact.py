@@ -64,10 +64,8 @@ def test_the_formula_gives_the_chains_pose_everywhere(case):
     assert_is_the_pose(case)
 
 
-def test_the_sum_of_joints_1_and_2_is_not_joint_12(tmp_path):
-    file = tmp_path / 'long_arm.yaml'
-    file.write_text(LONG_ARM)
-    case = Case('arm', 'dh', file)
+def test_the_sum_of_joints_1_and_2_is_not_joint_12(written):
+    case = Case('arm', 'dh', written(LONG_ARM))
     assert_is_the_pose(case)
     assert 'c_(1+2) c_12' in case.explain()
 
@@ -114,9 +112,8 @@ def test_no_joint_values_and_symbolic_without_values_are_the_same():
     assert LEG.explain() == LEG.explain('--symbolic')
 
 
-def test_a_formula_that_would_fill_pages_is_refused(tmp_path, capsys):
-    file = tmp_path / 'skew_arm.yaml'
-    file.write_text(ODD_ARM.read_text().replace('alpha: -pi/2', 'alpha: 1.1'))
+def test_a_formula_that_would_fill_pages_is_refused(written, capsys):
+    file = written(ODD_ARM.read_text().replace('alpha: -pi/2', 'alpha: 1.1'))
     assert main(['explain', 'odd_arm', '-k', str(file)]) == 2
     assert '3 of its alphas are not right angles' in capsys.readouterr().err
     assert Case('odd_arm', 'dh', file).explain('--symbolic', '--degrees', 1, 2, 3, 4)

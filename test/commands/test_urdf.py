@@ -68,18 +68,6 @@ def urdf_of(*words):
     return done.stdout
 
 
-@pytest.fixture
-def own_file(tmp_path):
-    """Return what writes a kinematics file and returns its path."""
-
-    def write(text):
-        file = tmp_path / 'robot.yaml'
-        file.write_text(text)
-        return file
-
-    return write
-
-
 def check_with_pinocchio(urdf, *chains, configurations=200):
     """Compare Pinocchio's poses of tip frames with ours, over random configurations."""
     for chain in chains:
@@ -114,25 +102,25 @@ def test_pinocchio_gives_our_poses_of_other_robots(file, name):
 @pytest.mark.parametrize('foot_frame', ['dh', 'sole'])
 @pytest.mark.parametrize('text', [SCARA, MIMIC])
 def test_fixed_rows_tip_transform_slides_and_followers_are_in_the_urdf(
-    own_file, text, foot_frame
+    written, text, foot_frame
 ):
-    file = own_file(text)
+    file = written(text)
     chain = load_chain('scara', file=file, frame=foot_frame)
     check_with_pinocchio(urdf_of('-k', file), chain)
 
 
-def test_a_rotation_that_was_typed_rounded_is_the_same_in_the_urdf(own_file):
+def test_a_rotation_that_was_typed_rounded_is_the_same_in_the_urdf(written):
     rounded = (
         '[[0.8660254, -0.5, 0, 0], [0.5, 0.8660259, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]'
     )
-    file = own_file(re.sub(r'T_Ro0: .*', f'T_Ro0: {rounded}', SCARA))
+    file = written(re.sub(r'T_Ro0: .*', f'T_Ro0: {rounded}', SCARA))
     done = run_main('urdf', '-k', file)
     assert 'corrected' in done.stderr
     check_with_pinocchio(done.stdout, load_chain('scara', file=file))
 
 
-def test_a_row_that_follows_is_a_mimic_joint_with_its_own_limits(own_file):
-    robot = ET.fromstring(urdf_of('-k', own_file(MIMIC)))
+def test_a_row_that_follows_is_a_mimic_joint_with_its_own_limits(written):
+    robot = ET.fromstring(urdf_of('-k', written(MIMIC)))
     follower = robot.find("joint[@name='elbow_2']")
     assert follower.find('mimic').attrib == {'joint': 'elbow', 'multiplier': '-0.5'}
     limit = follower.find('limit')
@@ -213,9 +201,9 @@ def other_chain(*changes):
     return SCARA + changed(SCARA[SCARA.index('  scara:') :], *names, *changes)
 
 
-def test_a_joint_that_two_chains_share_is_there_once(own_file):
+def test_a_joint_that_two_chains_share_is_there_once(written):
     # The lift is elsewhere along its axis in the other table, which makes no difference.
-    file = own_file(
+    file = written(
         other_chain(
             ('d: 0, alpha: 3.14', 'd: 0.02, alpha: 3.14'),
             ('d: 0.05, alpha: 1.57', 'd: 0.07, alpha: 1.57'),
@@ -254,5 +242,5 @@ def test_a_joint_that_two_chains_share_is_there_once(own_file):
         ),
     ],
 )
-def test_what_a_urdf_cannot_say_is_refused(own_file, text, complaint):
-    assert_one_line_complaint(run_main('urdf', '-k', own_file(text)), complaint)
+def test_what_a_urdf_cannot_say_is_refused(written, text, complaint):
+    assert_one_line_complaint(run_main('urdf', '-k', written(text)), complaint)

@@ -15,7 +15,7 @@ import webbrowser
 import hypothesis
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from icub_leg_fk.kinematics import Catalog, Chain, DHLink, load_chain
+from icub_leg_fk.kinematics import Catalog, DHLink, load_chain
 from icub_leg_fk.kinematics.rotation import turns_about
 from icub_leg_fk.tools.ros import running_ros
 from icub_leg_fk.tools.tracks import read_tracks, track_of
@@ -32,7 +32,7 @@ from icub_leg_fk.tools.viewer_scene import directions, labels, PosedChain
 from icub_leg_fk.tools.viewer_source import posture_at
 import numpy as np
 import pytest
-from support.any_chain import chains_and_positions
+from support.any_chain import chain_of, chains_and_positions
 from support.bag_files import joint_state, string
 from support.browser import (
     copied_texts,
@@ -441,15 +441,7 @@ def test_a_slider_goes_a_fifth_beyond_its_range(lower, upper, joint_type):
 
 
 def test_the_newest_sample_is_shown_and_how_old_it_is():
-    chain = Chain(
-        'slide',
-        '',
-        'root',
-        'tip',
-        ('x',),
-        (DHLink(0.0, 0.0, 0.0, joint_type='prismatic'),),
-        np.eye(4),
-    )
+    chain = chain_of([DHLink(0.0, 0.0, 0.0, joint_type='prismatic')])
     times, positions = np.array([1.0, 2.0, 3.0]), np.array([[0.1], [0.2], [0.3]])
     assert posture_at(0.5, chain, times, positions)[:2] == (None, 'no pose yet')
     assert posture_at(2.4, chain, times, positions)[:2] == ([0.2], '')

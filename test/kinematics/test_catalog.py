@@ -5,7 +5,6 @@ from pathlib import Path
 import re
 import subprocess
 import sys
-from typing import Any
 
 from icub_leg_fk.errors import CatalogError, LegFKError, UnknownNameError
 from icub_leg_fk.kinematics import Catalog, catalog, config_file, load_chain
@@ -32,7 +31,7 @@ needs_spec = pytest.mark.skipif(
 )
 
 
-def section(document: str, heading: str) -> str:
+def section(document, heading):
     """Return the text from a heading to the next one, with its table rules taken out."""
     text = re.sub(r'[|]', ' ', document.replace('&gt;', '>').replace('\\_', '_'))
     text = re.split(rf'^[# ]*{heading}\s*$', text, flags=re.MULTILINE)[1]
@@ -41,7 +40,7 @@ def section(document: str, heading: str) -> str:
     )[0]
 
 
-def printed_rows(text: str) -> list[dict[str, Any]]:
+def printed_rows(text):
     """Return the cells of a printed DH table, in mm and degrees."""
     degrees = {'0': 0, 'pi/2': 90, '-pi/2': -90, 'pi': 180}
     rows = []
@@ -64,7 +63,7 @@ def printed_rows(text: str) -> list[dict[str, Any]]:
     return rows
 
 
-def printed_matrix(text: str, name: str) -> list[list[float]]:
+def printed_matrix(text, name):
     """Return the first matrix after its name."""
     number = r'\s*(-?[\d.]+)'
     found = re.search(
@@ -75,7 +74,7 @@ def printed_matrix(text: str, name: str) -> list[list[float]]:
     return [values[i : i + 4] for i in range(0, 16, 4)]
 
 
-def documented_fields(row: dict[str, Any]) -> dict[str, Any]:
+def documented_fields(row):
     return {
         key: value
         for key, value in row.items()
@@ -86,7 +85,7 @@ def documented_fields(row: dict[str, Any]) -> dict[str, Any]:
 @needs_spec
 @pytest.mark.parametrize('language', ['en', 'es'])
 @pytest.mark.parametrize(('name', 'version'), LEGS)
-def test_leg_tables_are_as_printed(name: str, version: str, language: str) -> None:
+def test_leg_tables_are_as_printed(name, version, language):
     heading = LEGS[name, version]
     if language == 'es':
         heading = heading.replace('Left', 'Izquierda').replace('Right', 'Derecha')
@@ -98,7 +97,7 @@ def test_leg_tables_are_as_printed(name: str, version: str, language: str) -> No
 
 
 @needs_spec
-def test_head_table_is_as_printed() -> None:
+def test_head_table_is_as_printed():
     text = next(SPEC.glob('002_*')).read_text(encoding='utf-8').replace('|', ' ')
     table, virtual = text.split('In some circumstances')
     ours = PRINTED['chains']['head_imu']['versions']['v2']
@@ -116,9 +115,7 @@ def test_head_table_is_as_printed() -> None:
         for version in entry.versions
     ],
 )
-def test_loaded_tables_are_the_printed_ones_in_metres_and_radians(
-    name: str, version: str
-) -> None:
+def test_loaded_tables_are_the_printed_ones_in_metres_and_radians(name, version):
     printed = PRINTED['chains'][name]
     table = printed['versions'][version]
     chain = CATALOG.chain(name, version)
@@ -137,21 +134,14 @@ def test_loaded_tables_are_the_printed_ones_in_metres_and_radians(
     assert np.array_equal(chain.T_root_0, T)
 
 
-def test_errata_stand_beside_the_printed_ranges_of_the_documented_legs() -> None:
+def test_errata_stand_beside_the_printed_ranges_of_the_documented_legs():
     for name, version in LEGS:
         errata = [link.erratum for link in CATALOG.chain(name, version).links]
-        assert [bool(erratum) for erratum in errata] == [
-            False,
-            True,
-            False,
-            False,
-            True,
-            False,
-        ]
+        assert [i for i, erratum in enumerate(errata) if erratum] == [1, 4]
         assert 'sign' in errata[1] and 'narrower' in errata[4]
 
 
-def test_version_3_names_its_source_which_is_not_the_documents() -> None:
+def test_version_3_names_its_source_which_is_not_the_documents():
     for entry in CATALOG.chains.values():
         for version, chain in entry.versions.items():
             assert ('iCubGenova09' in chain.source) == (version == 'v3')
@@ -188,15 +178,13 @@ def test_version_3_names_its_source_which_is_not_the_documents() -> None:
         ),
     ],
 )
-def test_an_unknown_name_lists_the_known_ones(
-    arguments: tuple[str, ...], message: str
-) -> None:
+def test_an_unknown_name_lists_the_known_ones(arguments, message):
     with pytest.raises(UnknownNameError) as error:
         CATALOG.chain(*arguments)
     assert str(error.value) == message
 
 
-def test_a_version_that_one_chain_lacks_is_answered_with_the_way_to_name_it() -> None:
+def test_a_version_that_one_chain_lacks_is_answered_with_the_way_to_name_it():
     message = r"'v1' of chain head_imu; .*known: v2, v3; .*head_imu=v2"
     with pytest.raises(UnknownNameError, match=message):
         CATALOG.select(['left_leg', 'head_imu'], 'v1')
@@ -207,7 +195,7 @@ def test_a_version_that_one_chain_lacks_is_answered_with_the_way_to_name_it() ->
     ]
 
 
-def test_the_files_default_versions_count_where_none_is_given() -> None:
+def test_the_files_default_versions_count_where_none_is_given():
     versions = {name: CATALOG.chain(name).version for name in CATALOG.chains}
     assert versions == {'left_leg': 'v2_5', 'right_leg': 'v2_5', 'head_imu': 'v2'}
     assert load_chain('left_leg').version == 'v2_5'
@@ -216,11 +204,6 @@ def test_the_files_default_versions_count_where_none_is_given() -> None:
         == load_chain('left_leg', 'v1').version
         == 'v1'
     )
-    assert [chain.version for chain in CATALOG.select(CATALOG.chains)] == [
-        'v2_5',
-        'v2_5',
-        'v2',
-    ]
 
 
 @pytest.mark.parametrize(
@@ -245,9 +228,7 @@ def test_the_files_default_versions_count_where_none_is_given() -> None:
         (['left_leg='], "unknown chain 'left_leg='; did you mean 'left_leg'?"),
     ],
 )
-def test_chains_that_cannot_be_used_together_are_refused(
-    names: Any, words: str
-) -> None:
+def test_chains_that_cannot_be_used_together_are_refused(names, words):
     with pytest.raises(LegFKError) as error:
         CATALOG.select(names)
     assert words in str(error.value)
@@ -271,10 +252,8 @@ chains:
 """
 
 
-def test_any_robot_can_be_read_in_metres_and_radians(tmp_path: Path) -> None:
-    file = tmp_path / 'crane.yaml'
-    file.write_text(OWN)
-    chain = Catalog.load(file).chain('crane', 'small')
+def test_any_robot_can_be_read_in_metres_and_radians(written):
+    chain = Catalog.load(written(OWN)).chain('crane', 'small')
     assert [(link.a, link.d, link.alpha, link.offset) for link in chain.links] == [
         (0, 10, pi / 2, pi / 2),
         (0.5, -2, 0, 0),
@@ -287,7 +266,7 @@ def test_any_robot_can_be_read_in_metres_and_radians(tmp_path: Path) -> None:
     assert chain.T_root_0[2, 3] == 2.5
 
 
-def test_shipped_file_is_found_beside_the_sources() -> None:
+def test_shipped_file_is_found_beside_the_sources():
     assert (
         config_file('icub_kinematics.yaml') == ROOT / 'config' / 'icub_kinematics.yaml'
     )
@@ -303,8 +282,8 @@ def test_shipped_file_is_found_beside_the_sources() -> None:
     ],
 )
 def test_shipped_file_is_found_in_the_prefix_of_an_installation(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, below_prefix: str
-) -> None:
+    tmp_path, monkeypatch, below_prefix
+):
     share = tmp_path / 'share' / 'icub_leg_fk' / 'config'
     share.mkdir(parents=True)
     (share / 'icub_kinematics.yaml').write_text('x')
@@ -313,14 +292,14 @@ def test_shipped_file_is_found_in_the_prefix_of_an_installation(
     assert config_file('icub_kinematics.yaml') == share / 'icub_kinematics.yaml'
 
 
-def test_a_missing_shipped_file_lists_the_places_looked_at() -> None:
+def test_a_missing_shipped_file_lists_the_places_looked_at():
     with pytest.raises(
         CatalogError, match=r'^nothing\.yaml: .*allowed: one of .*config, '
     ):
         config_file('nothing.yaml')
 
 
-def test_loading_needs_only_the_file(tmp_path: Path) -> None:
+def test_loading_needs_only_the_file(tmp_path):
     """No ROS, no current directory, no environment."""
     code = 'from icub_leg_fk.kinematics import Catalog; print(*Catalog.load().chains)'
     result = subprocess.run(

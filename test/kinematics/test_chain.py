@@ -7,12 +7,11 @@ from fractions import Fraction
 from math import inf, nan, pi
 import pickle
 import tracemalloc
-from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
 from icub_leg_fk.errors import JointVectorError, LegFKError, UnknownNameError
-from icub_leg_fk.kinematics import Catalog, Chain, DHLink, TipFrame
+from icub_leg_fk.kinematics import Catalog, DHLink, TipFrame
 import numpy as np
 import pytest
 from support.any_chain import chain_of, CHAINS, chains_and_positions
@@ -29,9 +28,7 @@ ANY = st.one_of(
 
 
 @given(ANY)
-def test_frames_and_forward_are_the_products_of_the_basic_transforms(
-    case: tuple[Chain, list],
-) -> None:
+def test_frames_and_forward_are_the_products_of_the_basic_transforms(case):
     chain, Q = case
     for q in Q:
         found = chain.frames(q)
@@ -40,7 +37,7 @@ def test_frames_and_forward_are_the_products_of_the_basic_transforms(
 
 
 @given(ANY)
-def test_one_pose_and_many_are_forward(case: tuple[Chain, list]) -> None:
+def test_one_pose_and_many_are_forward(case):
     """Their quaternion is the one nearer to that at zero."""
     chain, Q = case
     zero = np.array(chain.pose([0.0] * chain.n)[3:])
@@ -58,9 +55,7 @@ def test_one_pose_and_many_are_forward(case: tuple[Chain, list]) -> None:
 
 
 @given(chains_and_positions(), st.data())
-def test_a_twist_is_the_jacobian_times_the_velocities(
-    case: tuple[Chain, list], data: st.DataObject
-) -> None:
+def test_a_twist_is_the_jacobian_times_the_velocities(case, data):
     chain, Q = case
     speeds = st.one_of(st.sampled_from([0.0, -0.0, 1.0]), st.floats(-20, 20))
     for q in Q:
@@ -71,7 +66,7 @@ def test_a_twist_is_the_jacobian_times_the_velocities(
 
 
 @given(chains_and_positions())
-def test_the_jacobian_is_the_derivative_of_the_pose(case: tuple[Chain, list]) -> None:
+def test_the_jacobian_is_the_derivative_of_the_pose(case):
     chain, Q = case
     step = 1e-5
     for q in Q:
@@ -85,9 +80,7 @@ def test_the_jacobian_is_the_derivative_of_the_pose(case: tuple[Chain, list]) ->
 
 
 @given(chains_and_positions())
-def test_a_mapping_is_as_good_as_a_list_and_may_hold_more(
-    case: tuple[Chain, list],
-) -> None:
+def test_a_mapping_is_as_good_as_a_list_and_may_hold_more(case):
     chain, Q = case
     for q in Q:
         named = {'other': nan, **dict(zip(chain.joint_names, q, strict=True))}
@@ -99,7 +92,7 @@ def test_a_mapping_is_as_good_as_a_list_and_may_hold_more(
 
 
 @given(CHAINS)
-def test_the_quaternion_at_zero_has_the_sign_of_its_own_rule(chain: Chain) -> None:
+def test_the_quaternion_at_zero_has_the_sign_of_its_own_rule(chain):
     *xyz, w = chain.pose([0.0] * chain.n)[3:]
     if abs(w) > 2e-6:
         assert w > 0
@@ -107,14 +100,14 @@ def test_the_quaternion_at_zero_has_the_sign_of_its_own_rule(chain: Chain) -> No
         assert max(xyz) > max(map(abs, xyz)) - 1e-5
 
 
-def test_a_mapping_that_lacks_a_joint_is_refused_by_its_name() -> None:
+def test_a_mapping_that_lacks_a_joint_is_refused_by_its_name():
     with pytest.raises(
         JointVectorError, match=r'q lacks l_knee, l_ankle_pitch; allowed'
     ):
         LEG.pose(dict.fromkeys((*LEG.joint_names[:3], LEG.joint_names[5]), 0.0))
 
 
-def test_a_slide_that_follows_a_turn_is_a_screw() -> None:
+def test_a_slide_that_follows_a_turn_is_a_screw():
     screw = chain_of(
         [
             DHLink(0, 0, 0, joint='nut'),
@@ -126,8 +119,8 @@ def test_a_slide_that_follows_a_turn_is_a_screw() -> None:
     assert screw.jacobian([0.0])[:, 0] == pytest.approx([0, 0.3, 0.01, 0, 0, 1])
 
 
-def test_memory_beyond_the_result_does_not_grow_with_the_number_of_poses() -> None:
-    def peak_beyond_result(rows: int) -> int:
+def test_memory_beyond_the_result_does_not_grow_with_the_number_of_poses():
+    def peak_beyond_result(rows):
         Q = np.random.default_rng(14).uniform(-1, 1, (rows, 6))
         tracemalloc.start()
         result = LEG.poses(Q)
@@ -180,9 +173,7 @@ DOORS = {
 
 @pytest.mark.parametrize('door', DOORS)
 @pytest.mark.parametrize('q', NOT_NUMBERS, ids=lambda q: repr(q)[:20])
-def test_a_bad_joint_vector_is_refused_by_every_door_in_one_line(
-    q: object, door: str
-) -> None:
+def test_a_bad_joint_vector_is_refused_by_every_door_in_one_line(q, door):
     if door == 'poses' and type(q) is np.ma.MaskedArray:
         q = np.ma.array([q])
     with pytest.raises(JointVectorError, match=r'; allowed: ') as refusal:
@@ -192,7 +183,7 @@ def test_a_bad_joint_vector_is_refused_by_every_door_in_one_line(
 
 
 @pytest.mark.parametrize('value', [nan, inf, -inf])
-def test_a_bad_entry_is_named_by_its_place(value: float) -> None:
+def test_a_bad_entry_is_named_by_its_place(value):
     with pytest.raises(
         JointVectorError, match=r'q\[2\] is (nan|-?inf); allowed: finite numbers'
     ):
@@ -224,9 +215,7 @@ def test_a_bad_entry_is_named_by_its_place(value: float) -> None:
     ],
 )
 @pytest.mark.parametrize('several', [list, tuple, np.array])
-def test_numbers_of_any_type_are_computed_in_float64(
-    number: type, several: Any
-) -> None:
+def test_numbers_of_any_type_are_computed_in_float64(number, several):
     for table in (LEG, chain_of([DHLink(0.3, 0.1, 0.4, joint_type='prismatic')] * 6)):
         q = several([number(value) for value in (1, 0.3, 2, 0.7, 0, 1.1)])
         exact = [float(value) for value in q]
@@ -242,7 +231,7 @@ def test_numbers_of_any_type_are_computed_in_float64(
 @pytest.mark.filterwarnings('error')
 @pytest.mark.parametrize('door', ['forward', 'frames', 'pose', 'poses', 'jacobian'])
 @pytest.mark.parametrize('gain', [1.0, 2.0])
-def test_values_too_large_to_compute_with_are_refused(door: str, gain: float) -> None:
+def test_values_too_large_to_compute_with_are_refused(door, gain):
     slide = DHLink(0, 1e308, 0, joint_type='prismatic', gain=gain)
     for chain in (chain_of([slide] * 2), chain_of([slide, DHLink(0, 0, 0, gain=1e10)])):
         q = [1.7e308] * 2
@@ -251,7 +240,7 @@ def test_values_too_large_to_compute_with_are_refused(door: str, gain: float) ->
 
 
 @given(st.lists(st.integers(0, 3), max_size=3))
-def test_forward_and_frames_broadcast(shape: list[int]) -> None:
+def test_forward_and_frames_broadcast(shape):
     Q = np.random.default_rng(15).uniform(-1, 1, (*shape, 6))
     T = LEG.forward(Q)
     assert T.shape == (*shape, 4, 4)
@@ -264,7 +253,7 @@ def test_forward_and_frames_broadcast(shape: list[int]) -> None:
 @pytest.mark.parametrize(
     'Q', [[0.0] * 6, [[0.0] * 5], [[[0.0] * 6]], 3.0, [[0.0] * 6, [0.0]]], ids=repr
 )
-def test_arrays_of_another_shape_are_refused(Q: object) -> None:
+def test_arrays_of_another_shape_are_refused(Q):
     with pytest.raises(JointVectorError, match=r'\(N, 6\)'):
         LEG.poses(Q)
 
@@ -292,7 +281,7 @@ ONE_JOINT = chain_of([TURN])
     ],
     ids=repr,
 )
-def test_a_chain_that_cannot_be_is_refused(mistake: Any) -> None:
+def test_a_chain_that_cannot_be_is_refused(mistake):
     with pytest.raises(LegFKError, match=r'; allowed( in .*)?: .'):
         replace(ONE_JOINT, **mistake)
 
@@ -309,17 +298,17 @@ def test_a_chain_that_cannot_be_is_refused(mistake: Any) -> None:
     ],
     ids=repr,
 )
-def test_a_row_that_cannot_be_is_refused(mistake: Any) -> None:
+def test_a_row_that_cannot_be_is_refused(mistake):
     with pytest.raises(LegFKError, match=r'; allowed: .'):
         replace(TURN, **mistake)
 
 
-def test_a_tip_frame_that_cannot_be_is_refused() -> None:
+def test_a_tip_frame_that_cannot_be_is_refused():
     with pytest.raises(LegFKError, match=r'transform of tip frame sole is .*; allowed'):
         TipFrame('sole', np.zeros((4, 4)))
 
 
-def test_a_row_of_an_unknown_joint_is_refused() -> None:
+def test_a_row_of_an_unknown_joint_is_refused():
     with pytest.raises(
         UnknownNameError, match="unknown joint 'knee' of chain any; known: hip"
     ):
@@ -327,7 +316,7 @@ def test_a_row_of_an_unknown_joint_is_refused() -> None:
 
 
 @given(CHAINS)
-def test_a_chain_is_a_value(chain: Chain) -> None:
+def test_a_chain_is_a_value(chain):
     """It copies, pickles, compares and hashes by what it holds, and nobody can write to it."""
     before = chain.pose([0.1] * chain.n)
     for again in (
@@ -358,7 +347,7 @@ def test_a_chain_is_a_value(chain: Chain) -> None:
     assert chain != 'chain'
 
 
-def test_what_is_handed_out_does_not_change_a_chain() -> None:
+def test_what_is_handed_out_does_not_change_a_chain():
     before = LEG.pose([0.1] * 6)
     sole = LEG.sole_outline([0.0] * 6)
     for mine in (
@@ -372,7 +361,7 @@ def test_what_is_handed_out_does_not_change_a_chain() -> None:
     assert np.abs(LEG.sole_outline([0.0] * 6)).max() < 1
 
 
-def test_a_chain_in_another_frame_of_its_tip() -> None:
+def test_a_chain_in_another_frame_of_its_tip():
     sole = LEG.with_frame('sole')
     assert (LEG.frame, LEG.frame_id) == ('dh', 'l_foot_dh_frame')
     assert (sole.frame, sole.frame_id) == ('sole', 'l_sole')
@@ -383,7 +372,7 @@ def test_a_chain_in_another_frame_of_its_tip() -> None:
         LEG.with_frame('toe')
 
 
-def test_the_sole_is_where_the_sole_frame_is_whatever_frame_poses_are_in() -> None:
+def test_the_sole_is_where_the_sole_frame_is_whatever_frame_poses_are_in():
     q = [0.1, 0.2, -0.3, -0.4, 0.2, 0.1]
     corners = np.array(
         [[-0.07, 0.04, 0], [0.12, 0.04, 0], [0.12, -0.04, 0], [-0.07, -0.04, 0]]
@@ -395,7 +384,7 @@ def test_the_sole_is_where_the_sole_frame_is_whatever_frame_poses_are_in() -> No
     assert Catalog.load().chain('head_imu').sole_outline([0.0] * 6) is None
 
 
-def test_a_chain_prints_as_its_table() -> None:
+def test_a_chain_prints_as_its_table():
     heading, titles, *rows = str(LEG).splitlines()
     assert 'mm, deg' in heading and 'standard' in heading
     assert titles.split() == ['i', 'joint', 'a', 'd', 'alpha', 'theta', 'range']
@@ -415,7 +404,7 @@ def test_a_chain_prints_as_its_table() -> None:
     ]
 
 
-def test_a_notebook_shows_the_table_with_names_of_any_text() -> None:
+def test_a_notebook_shows_the_table_with_names_of_any_text():
     odd = chain_of(
         [DHLink(0, 0, 0), DHLink(0, 0.2, 0, joint_type='prismatic', gain=-0.5)],
         joint_names=['a<b>', '&c'],
@@ -428,7 +417,7 @@ def test_a_notebook_shows_the_table_with_names_of_any_text() -> None:
 
 
 @given(CHAINS)
-def test_every_repr_fits_a_line(chain: Chain) -> None:
+def test_every_repr_fits_a_line(chain):
     shown = [
         chain,
         chain.rows()[0],
@@ -441,7 +430,7 @@ def test_every_repr_fits_a_line(chain: Chain) -> None:
         assert len(repr(thing)) < 120 and repr(thing).isprintable()
 
 
-def test_limits_are_the_robots_where_known_and_else_the_printed_ones() -> None:
+def test_limits_are_the_robots_where_known_and_else_the_printed_ones():
     assert np.degrees(LEG.lower) == pytest.approx([-45, -20, -80, -124, -35, -25])
     old = Catalog.load().chain('left_leg', 'v1')
     assert np.degrees(old.upper) == pytest.approx([132, 17, 79, 0, 21, 24])

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from icub_leg_fk.errors import CatalogError
 from icub_leg_fk.kinematics import Catalog, DHLink, load_chain
@@ -16,7 +15,7 @@ EXAMPLES = Path(__file__).resolve().parents[2] / 'config' / 'examples'
 TOLERANCE = 1e-12
 
 
-def models() -> dict[str, Any]:
+def models():
     """Return every model of roboticstoolbox that is a DH table and loads."""
     try:
         from roboticstoolbox.models import DH
@@ -35,7 +34,7 @@ def models() -> dict[str, Any]:
     return found
 
 
-def row_as_yaml(link: Any) -> str:
+def row_as_yaml(link):
     # Its standard links slide along z by q; theta and d are what the joint does not move.
     offset, d, more = float(link.offset), float(link.d), ''
     if link.isprismatic:
@@ -46,11 +45,11 @@ def row_as_yaml(link: Any) -> str:
     return f'a: {a!r}, d: {d!r}, alpha: {alpha!r}, offset: {offset!r}{more}'
 
 
-def matrix(T: Any) -> str:
+def matrix(T):
     return str(np.asarray(T, dtype=float).tolist())
 
 
-def as_yaml(model: Any) -> str:
+def as_yaml(model):
     """Return a model of roboticstoolbox as a kinematics file, every digit of it."""
     lines = ''.join(f'          - {{{row_as_yaml(link)}}}\n' for link in model.links)
     names = ', '.join(f'q{i}' for i in range(len(model.links)))
@@ -71,20 +70,18 @@ chains:
 """
 
 
-def largest_length(model: Any) -> float:
+def largest_length(model):
     return max(1.0, *(abs(float(link.a)) + abs(float(link.d)) for link in model.links))
 
 
-def test_the_models_of_roboticstoolbox_are_computed_exactly(tmp_path: Path) -> None:
+def test_the_models_of_roboticstoolbox_are_computed_exactly(written):
     found = models()
     modified = [name for name, model in found.items() if model.mdh]
     sliding = [name for name, model in found.items() if any(model.prismaticjoints)]
     assert len(found) >= 20 and modified and sliding
     rng = np.random.default_rng(20)
     for name, model in found.items():
-        file = tmp_path / f'{name}.yaml'
-        file.write_text(as_yaml(model))
-        chain = Catalog.load(file).chain('robot')
+        chain = Catalog.load(written(as_yaml(model))).chain('robot')
         allowed = TOLERANCE * largest_length(model)
         for q in rng.uniform(-3, 3, (6, chain.n)):
             frames = np.array([T.A for T in model.fkine_all(q)])
@@ -96,7 +93,7 @@ def test_the_models_of_roboticstoolbox_are_computed_exactly(tmp_path: Path) -> N
             ), name
 
 
-def test_the_makers_panda_is_roboticstoolboxs() -> None:
+def test_the_makers_panda_is_roboticstoolboxs():
     panda = load_chain('panda', 'fci', file=EXAMPLES / 'panda.yaml')
     model = pytest.importorskip('roboticstoolbox', reason='needs it').models.DH.Panda()
     assert panda.n == 7 and len(panda.links) == 8
@@ -105,7 +102,7 @@ def test_the_makers_panda_is_roboticstoolboxs() -> None:
         assert np.abs(panda.forward(q) - flange).max() < TOLERANCE
 
 
-def test_a_modified_chain_gives_and_prints_its_rows_as_craig_does() -> None:
+def test_a_modified_chain_gives_and_prints_its_rows_as_craig_does():
     panda = load_chain('panda', 'fci', file=EXAMPLES / 'panda.yaml')
     rows = [row.link for row in panda.rows()]
     assert [row.a for row in rows] == [0, 0, 0, 0.0825, -0.0825, 0, 0.088, 0]
@@ -133,9 +130,7 @@ TURN, SHIFTED = DHLink(0.1, 0, 0.7, -0.2), DHLink(0.3, 0, -0.4, joint_type='fixe
         (PLAIN, FIXED),
     ],
 )
-def test_modified_rows_come_back_and_give_craigs_frames(
-    rows: tuple[DHLink, ...],
-) -> None:
+def test_modified_rows_come_back_and_give_craigs_frames(rows):
     assert modified_rows(standard_rows(rows)) == rows
     chain = replace(chain_of(standard_rows(rows)), convention='modified')
     q = [0.4] * chain.n
@@ -176,13 +171,11 @@ chains:
 
 
 @pytest.fixture
-def arm(tmp_path: Path) -> Path:
-    file = tmp_path / 'arm.yaml'
-    file.write_text(ARM)
-    return file
+def arm(written):
+    return written(ARM)
 
 
-def test_fractions_of_pi_are_exact_and_a_gain_turns_a_joint_around(arm: Path) -> None:
+def test_fractions_of_pi_are_exact_and_a_gain_turns_a_joint_around(arm):
     chain = Catalog.load(arm).chain('arm', 'v1')
     assert [link.alpha for link in chain.links] == [np.pi / 2, np.pi]
     assert [link.offset for link in chain.links] == [-np.pi / 2, 3 * np.pi / 4]
@@ -192,7 +185,7 @@ def test_fractions_of_pi_are_exact_and_a_gain_turns_a_joint_around(arm: Path) ->
     assert chain.forward([0.3, 0.1])[:3, 3] == pytest.approx(expected, abs=1e-15)
 
 
-def test_a_version_says_otherwise_what_its_chain_says(arm: Path) -> None:
+def test_a_version_says_otherwise_what_its_chain_says(arm):
     one, two = (Catalog.load(arm).chain('arm', version) for version in ('v1', 'v2'))
     assert (one.root_frame, one.joint_names, one.frame_id) == (
         'base',
@@ -207,7 +200,7 @@ def test_a_version_says_otherwise_what_its_chain_says(arm: Path) -> None:
     assert one.tip == two.tip == 'hand'
 
 
-def test_what_can_hardly_be_meant_is_computed_and_reported(arm: Path) -> None:
+def test_what_can_hardly_be_meant_is_computed_and_reported(arm):
     rotation, length, angle = Catalog.load(arm).warnings
     assert (
         f'{arm}:8: chain arm, field tip_frames, pad, field transform: the rot'
@@ -267,11 +260,8 @@ def test_what_can_hardly_be_meant_is_computed_and_reported(arm: Path) -> None:
         ('m, angle: rad', 'a: 1, d: 0, alpha: 1.55', ''),
     ],
 )
-def test_a_table_in_another_unit_is_doubted(
-    units: str, row: str, doubt: str, tmp_path: Path
-) -> None:
-    file = tmp_path / 'arm.yaml'
-    file.write_text(
+def test_a_table_in_another_unit_is_doubted(units, row, doubt, written):
+    file = written(
         f'units: {{length: {units}}}\nchains:\n  arm:\n    tip: tool\n'
         '    root_frame: base\n    joints: [j]\n    tip_frames: {dh: {frame: t}}\n'
         f'    versions: {{v1: {{links: [{{{row}}}]}}}}\n'
@@ -280,19 +270,17 @@ def test_a_table_in_another_unit_is_doubted(
     assert len(warnings) == bool(doubt) and doubt in ''.join(warnings)
 
 
-def test_three_decimals_are_too_few_for_a_rotation(arm: Path) -> None:
+def test_three_decimals_are_too_few_for_a_rotation(arm):
     arm.write_text(ARM.replace('0.7071', '0.707'))
     with pytest.raises(CatalogError, match=r'not a rigid transform.*four decimals'):
         Catalog.load(arm)
 
 
-def test_two_catalogs_of_one_table_are_equal_whatever_their_path(
-    arm: Path, tmp_path: Path
-) -> None:
-    (tmp_path / 'copy.yaml').write_text(ARM.replace('d: 0.2', 'd: 0.20'))
-    one, two = Catalog.load(arm), Catalog.load(tmp_path / 'copy.yaml')
+def test_two_catalogs_of_one_table_are_equal_whatever_their_path(arm, written):
+    copy = written(ARM.replace('d: 0.2', 'd: 0.20'), 'copy')
+    one, two = Catalog.load(arm), Catalog.load(copy)
     assert one == two and hash(one) == hash(two) and Catalog.load() == Catalog.load()
-    (tmp_path / 'copy.yaml').write_text(ARM.replace('d: 0.2', 'd: 0.21'))
-    assert Catalog.load(tmp_path / 'copy.yaml') != one
+    copy.write_text(ARM.replace('d: 0.2', 'd: 0.21'))
+    assert Catalog.load(copy) != one
     with pytest.raises(ValueError, match='read-only'):
         one.entry('arm').versions['v1'].T_root_0[0, 3] = 1.0

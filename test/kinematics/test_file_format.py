@@ -1,7 +1,5 @@
 """What a kinematics file may say: gains, rows that follow, defaults, axes, soles, any names."""
 
-from pathlib import Path
-
 from icub_leg_fk.errors import VersionNeededError
 from icub_leg_fk.kinematics import Catalog, load_chain
 import numpy as np
@@ -43,13 +41,11 @@ chains:
 
 
 @pytest.fixture
-def finger(tmp_path: Path) -> Catalog:
-    file = tmp_path / 'finger.yaml'
-    file.write_text(FINGER)
-    return Catalog.load(file)
+def finger(written):
+    return Catalog.load(written(FINGER))
 
 
-def test_rows_follow_the_joints_that_they_name(finger: Catalog) -> None:
+def test_rows_follow_the_joints_that_they_name(finger):
     chain = finger.chain('finger')
     curl = 'robot::hand/curl (1)'
     assert chain.joint_names == ('slide', 'spread', curl)
@@ -66,7 +62,7 @@ def test_rows_follow_the_joints_that_they_name(finger: Catalog) -> None:
         assert chain.pose(q)[:3] == pytest.approx(T[:3, 3], abs=1e-14)
 
 
-def test_a_joint_has_the_range_of_the_first_row_that_it_moves(finger: Catalog) -> None:
+def test_a_joint_has_the_range_of_the_first_row_that_it_moves(finger):
     chain = finger.chain('finger')
     assert [link.a for link in chain.joints] == [0, 0, 0.04]
     assert np.degrees(chain.upper) == pytest.approx([np.inf, np.inf, 90])
@@ -74,7 +70,7 @@ def test_a_joint_has_the_range_of_the_first_row_that_it_moves(finger: Catalog) -
     assert chain.out_of_range({curl: 2.0, 'slide': 9.0, 'spread': 0.0}) == (curl,)
 
 
-def test_what_is_not_said_is_zero_and_the_identity(finger: Catalog) -> None:
+def test_what_is_not_said_is_zero_and_the_identity(finger):
     chain = finger.chain('finger')
     assert [link.offset for link in chain.links] == [0, 0, np.radians(5), 0]
     assert np.array_equal(chain.T_root_0, np.eye(4)) and np.array_equal(
@@ -83,15 +79,10 @@ def test_what_is_not_said_is_zero_and_the_identity(finger: Catalog) -> None:
     assert finger.chain('finger', 'large').T_root_0[0, 3] == 0.005
 
 
-def test_a_default_is_the_chains_own_the_files_or_the_only_version(
-    finger: Catalog, tmp_path: Path
-) -> None:
+def test_a_default_is_the_chains_own_the_files_or_the_only_version(finger, written):
     assert finger.chain('finger').version == 'small'
     assert finger.chain('thumb').version == 'only'
-    file = tmp_path / 'own.yaml'
-    file.write_text(
-        FINGER.replace('  finger:', '  finger:\n    default_version: large')
-    )
+    file = written(FINGER.replace('  finger:', '  finger:\n    default_version: large'))
     assert load_chain('finger', file=file).version == 'large'
     file.write_text(FINGER.replace('default_version: small', ''))
     with pytest.raises(VersionNeededError) as error:
@@ -102,15 +93,13 @@ def test_a_default_is_the_chains_own_the_files_or_the_only_version(
     assert (error.value.chain, error.value.versions) == ('finger', ('small', 'large'))
 
 
-def test_root_axes_are_a_versions_or_its_chains_and_conflict_with_none_given(
-    finger: Catalog,
-) -> None:
+def test_root_axes_are_a_versions_or_its_chains_and_conflict_with_none_given(finger):
     assert finger.chain('finger').root_axes == ('left', 'up', 'forward')
     assert finger.chain('finger=large').root_axes == ('forward', 'left', 'up')
     assert len(finger.select(['finger=large', 'thumb'])) == 2
 
 
-def test_outlines_are_shared_by_an_alias(finger: Catalog) -> None:
+def test_outlines_are_shared_by_an_alias(finger):
     for name in ('finger', 'thumb'):
         (frame,) = finger.chain(name).tip_frames.values()
         assert frame.outline == pytest.approx(
@@ -118,20 +107,17 @@ def test_outlines_are_shared_by_an_alias(finger: Catalog) -> None:
         )
 
 
-def test_names_are_any_text(finger: Catalog, tmp_path: Path) -> None:
+def test_names_are_any_text(finger, written):
     assert finger.chain('finger').frame_id == 'the pad [left]'
-    file = tmp_path / 'named.yaml'
     text = FINGER.replace('  thumb:', '  "the thumb=left, möglichst":')
-    file.write_text(text.replace('only:', '"2.5 new":'), encoding='utf-8')
-    catalog = Catalog.load(file)
+    catalog = Catalog.load(written(text.replace('only:', '"2.5 new":')))
     assert catalog.chain('the thumb=left, möglichst').version == '2.5 new'
     assert catalog.chain('the thumb=left, möglichst=2.5 new').version == '2.5 new'
     assert catalog.chain('finger=large').version == 'large'
 
 
-def test_the_scoped_names_of_simulators_are_read(tmp_path: Path) -> None:
-    file = tmp_path / 'scoped.yaml'
-    file.write_text("""
+def test_the_scoped_names_of_simulators_are_read(written):
+    file = written("""
 units: {length: m, angle: deg}
 chains:
   arm:

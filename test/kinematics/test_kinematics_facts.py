@@ -23,15 +23,13 @@ FOOT_AT_ZERO = [[0, 0, -1], [0, 1, 0], [1, 0, 0]]
         ('head_imu=v2', (13.0, 6.6, 375.6), np.eye(3)),
     ],
 )
-def test_a_tip_at_zero_is_where_it_is_known_to_be(
-    name: str, position_mm: tuple[float, ...], rotation: np.ndarray
-) -> None:
+def test_a_tip_at_zero_is_where_it_is_known_to_be(name, position_mm, rotation):
     T = CATALOG.chain(name).forward([0] * 6)
     assert T[:3, 3] * 1000 == pytest.approx(position_mm, abs=1e-10)
     assert np.array_equal(T[:3, :3], rotation)
 
 
-def test_version_3_serves_the_whole_robot() -> None:
+def test_version_3_serves_the_whole_robot():
     names = ['left_leg', 'right_leg', 'head_imu']
     chains = CATALOG.select(names, 'v3')
     assert [(chain.root_frame, chain.root_axes) for chain in chains] == [
@@ -42,7 +40,7 @@ def test_version_3_serves_the_whole_robot() -> None:
 
 
 @needs_real_robots
-def test_the_head_of_version_3_is_that_of_its_robot() -> None:
+def test_the_head_of_version_3_is_that_of_its_robot():
     text = REAL['iCubGenova09'].read_text()
     head = CATALOG.chain('head_imu', 'v3')
     for q in np.random.default_rng(8).uniform(-1.5, 1.5, (100, 6)):
@@ -52,7 +50,7 @@ def test_the_head_of_version_3_is_that_of_its_robot() -> None:
 
 
 @pytest.mark.parametrize('version', ['v1', 'v2_5', 'v3'])
-def test_right_foot_mirrors_left_foot(version: str) -> None:
+def test_right_foot_mirrors_left_foot(version):
     left, right = CATALOG.select(['left_leg', 'right_leg'], version)
     Q = np.random.default_rng(3).uniform(-3, 3, (1000, 6))
     mirrored = MIRROR @ left.forward(Q) @ MIRROR
@@ -60,7 +58,7 @@ def test_right_foot_mirrors_left_foot(version: str) -> None:
 
 
 @pytest.mark.parametrize('name', ['left_leg', 'right_leg'])
-def test_sole_points_forward_left_and_up_when_standing(name: str) -> None:
+def test_sole_points_forward_left_and_up_when_standing(name):
     for version in CATALOG.chains[name].versions:
         T = CATALOG.chain(name, version, 'sole').forward([0] * 6)
         # The root frame's x points backward and its y to the robot's right, but on the iCub 3.
@@ -70,7 +68,7 @@ def test_sole_points_forward_left_and_up_when_standing(name: str) -> None:
         )
 
 
-def test_out_of_range_names_the_joints_and_clamps_nothing() -> None:
+def test_out_of_range_names_the_joints_and_clamps_nothing():
     chain = CATALOG.chain('left_leg', 'v2_5')
     within, outside = [0.0] * 6, [0.0, np.radians(-30), 0.0, 0.1, 0.0, 0.0]
     assert chain.out_of_range(within) == ()

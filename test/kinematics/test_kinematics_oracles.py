@@ -1,6 +1,6 @@
 """Every documented chain, in every version and tip frame, against Pinocchio or by hand."""
 
-from icub_leg_fk.kinematics import Catalog, Chain
+from icub_leg_fk.kinematics import Catalog
 import numpy as np
 import pytest
 from support.node_oracle import oracle_jacobian, oracle_pose
@@ -12,7 +12,7 @@ TOLERANCE = 1e-12
 every_case = pytest.mark.parametrize(('name', 'version', 'frame'), CASES)
 
 
-def configurations(chain: Chain, count: int) -> np.ndarray:
+def configurations(chain, count):
     """Return joint vectors inside the documented ranges, as many anywhere, and the zero."""
     rng = np.random.default_rng(1)
     inside = rng.uniform(chain.lower, chain.upper, (count, chain.n))
@@ -20,7 +20,7 @@ def configurations(chain: Chain, count: int) -> np.ndarray:
     return np.vstack((inside, anywhere, np.zeros((1, chain.n))))
 
 
-def test_every_shipped_table_has_an_oracle() -> None:
+def test_every_shipped_table_has_an_oracle():
     shipped = [
         (chain.name, version, frame)
         for entry in CATALOG.chains.values()
@@ -31,7 +31,7 @@ def test_every_shipped_table_has_an_oracle() -> None:
 
 
 @every_case
-def test_poses_are_the_oracles(name: str, version: str, frame: str) -> None:
+def test_poses_are_the_oracles(name, version, frame):
     chain = CATALOG.chain(name, version, frame)
     Q = configurations(chain, 200)
     expected = np.array([oracle_pose(name, version, q, frame) for q in Q])
@@ -43,9 +43,7 @@ def test_poses_are_the_oracles(name: str, version: str, frame: str) -> None:
 
 
 @every_case
-def test_jacobians_and_twists_are_pinocchios(
-    name: str, version: str, frame: str
-) -> None:
+def test_jacobians_and_twists_are_pinocchios(name, version, frame):
     chain = CATALOG.chain(name, version, frame)
     qdot = np.linspace(-3, 2, chain.n)
     for q in configurations(chain, 25):

@@ -12,7 +12,7 @@ STANDING = 80.0  # N; a foot with more than this on it stands
 
 
 @needs_recorded_walk
-def test_soles_are_parallel_and_level_while_both_feet_stand() -> None:
+def test_soles_are_parallel_and_level_while_both_feet_stand():
     names, _, positions, forces = read_recorded_walk()
     both = (forces > STANDING).all(axis=1)
     assert both.sum() > 200

@@ -22,19 +22,19 @@ COMPONENT = st.one_of(
 
 
 @st.composite
-def axes(draw: st.DrawFn) -> np.ndarray:
+def axes(draw):
     axis = np.array([draw(COMPONENT) for _ in range(3)])
     length = np.linalg.norm(axis)
     return axis / length if length > 1e-6 else np.array([0.0, 0.0, 1.0])
 
 
-def rodrigues(axis: np.ndarray, angle: float) -> np.ndarray:
+def rodrigues(axis, angle):
     x, y, z = axis
     K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.eye(3) + math.sin(angle) * K + (1 - math.cos(angle)) * (K @ K)
 
 
-def check_unit_with_positive_w(q: np.ndarray) -> None:
+def check_unit_with_positive_w(q):
     assert np.linalg.norm(q) == pytest.approx(1, abs=4 * EPS)
     assert q[3] >= 0
     assert not np.signbit(q[q == 0]).any()
@@ -47,16 +47,14 @@ def check_unit_with_positive_w(q: np.ndarray) -> None:
 @example(np.array([0.6, 0.0, 0.8]), math.pi - 1e-9)
 @example(np.array([0.6, 0.0, -0.8]), math.pi + 1e-9)
 @example(np.array([0.0, 0.0, 1.0]), 0.0)
-def test_quaternion_is_the_axis_and_half_the_angle(
-    axis: np.ndarray, angle: float
-) -> None:
+def test_quaternion_is_the_axis_and_half_the_angle(axis, angle):
     q = matrix_to_quaternion(rodrigues(axis, angle))
     expected = np.array([*(math.sin(angle / 2) * axis), math.cos(angle / 2)])
     assert min(np.abs(q - expected).max(), np.abs(q + expected).max()) < 1e-14
     check_unit_with_positive_w(q)
 
 
-def test_arrays_of_rotations_are_converted_one_by_one() -> None:
+def test_arrays_of_rotations_are_converted_one_by_one():
     rng = np.random.default_rng(12)
     q = rng.normal(size=(4, 5, 4))
     q /= np.linalg.norm(q, axis=-1, keepdims=True) * np.sign(q[..., 3:])
@@ -66,7 +64,7 @@ def test_arrays_of_rotations_are_converted_one_by_one() -> None:
 
 
 @pytest.mark.parametrize('quarters', range(-8, 9))
-def test_right_angles_are_exact(quarters: int) -> None:
+def test_right_angles_are_exact(quarters):
     exact = ((1, 0), (0, 1), (-1, 0), (0, -1))[quarters % 4]
     assert cos_sin(quarters * math.pi / 2) == exact
     assert cos_sin(math.radians(90 * quarters)) == exact
@@ -74,7 +72,7 @@ def test_right_angles_are_exact(quarters: int) -> None:
 
 
 @given(st.floats(-1e300, 1e300))
-def test_other_angles_are_the_c_librarys(angle: float) -> None:
+def test_other_angles_are_the_c_librarys(angle):
     c, s = cos_sin(angle)
     assert c == pytest.approx(math.cos(angle), abs=3e-15)
     assert s == pytest.approx(math.sin(angle), abs=3e-15)
@@ -92,11 +90,11 @@ def test_other_angles_are_the_c_librarys(angle: float) -> None:
         np.eye(3),
     ],
 )
-def test_what_is_no_rotation_is_no_rigid_transform(T: np.ndarray) -> None:
+def test_what_is_no_rotation_is_no_rigid_transform(T):
     assert not is_rigid_transform(T)
 
 
-def test_a_rounded_rotation_is_corrected_and_an_exact_one_is_untouched() -> None:
+def test_a_rounded_rotation_is_corrected_and_an_exact_one_is_untouched():
     rounded = np.round(rodrigues(np.array([0.6, 0.0, 0.8]), 0.7), 7)
     corrected = nearest_rotation(rounded)
     assert np.abs(corrected - rounded).max() < 1e-7
@@ -105,7 +103,7 @@ def test_a_rounded_rotation_is_corrected_and_an_exact_one_is_untouched() -> None
     assert nearest_rotation(exact) is exact
 
 
-def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
+def rotation(roll, pitch, yaw):
     """Rz(yaw) Ry(pitch) Rx(roll), as the URDF specification defines rpy."""
     x, y, z = np.eye(3)
     return rodrigues(z, yaw) @ rodrigues(y, pitch) @ rodrigues(x, roll)
@@ -115,7 +113,7 @@ def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
 @pytest.mark.parametrize(
     'nudge', [0, 1e-16, 1e-12, 1e-9, 1e-8, 1e-7, 1e-5, 1e-3, 0.5, 1.5]
 )
-def test_roll_pitch_yaw_turn_back_into_the_rotation(nudge: float, sign: float) -> None:
+def test_roll_pitch_yaw_turn_back_into_the_rotation(nudge, sign):
     pitch = sign * (math.pi / 2 - nudge)
     for roll, yaw in np.random.default_rng(3).uniform(-math.pi, math.pi, (50, 2)):
         R = rotation(roll, pitch, yaw)

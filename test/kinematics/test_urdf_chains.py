@@ -13,7 +13,7 @@ import pytest
 from support.robots import joint, robot
 
 ROOT = Path(__file__).resolve().parents[2]
-SHARED = ROOT.parent / 'shared'
+URDFS = ROOT.parent / 'shared' / 'data' / 'urdf'
 ARM = robot(
     [
         joint(0),
@@ -24,22 +24,20 @@ ARM = robot(
 ).replace('l3"', 'the tool [x]"')
 
 needs_robots = pytest.mark.skipif(
-    not (SHARED / 'data' / 'urdf').is_dir(), reason='../shared has the URDFs of iCubs'
+    not URDFS.is_dir(), reason='../shared has the URDFs of iCubs'
 )
 
 
 @pytest.fixture
-def arm(tmp_path: Path) -> Path:
-    file = tmp_path / 'arm.urdf'
-    file.write_text(ARM)
-    return file
+def arm(written):
+    return written(ARM, 'arm.urdf')
 
 
-def icub(name: str) -> Catalog:
-    return Catalog.load(SHARED / 'data' / 'urdf' / f'{name}.urdf')
+def icub(name, **options):
+    return Catalog.load(URDFS / f'{name}.urdf', **options)
 
 
-def test_every_link_below_the_root_with_a_joint_between_is_a_chain(arm: Path) -> None:
+def test_every_link_below_the_root_with_a_joint_between_is_a_chain(arm):
     chain = load_chain('the tool [x]', file=arm)
     assert (chain.name, chain.version, chain.root_frame) == (
         'the tool [x]',
@@ -53,28 +51,22 @@ def test_every_link_below_the_root_with_a_joint_between_is_a_chain(arm: Path) ->
     assert chain.root_axes == () and chain.source == 'arm.urdf'
 
 
-def test_chains_whose_topics_would_have_one_name_are_not_used_together(
-    tmp_path: Path,
-) -> None:
-    file = tmp_path / 'arm.urdf'
-    file.write_text(ARM.replace('"l2"', '"the_tool__x_"'))
+def test_chains_whose_topics_would_have_one_name_are_not_used_together(written):
+    file = written(ARM.replace('"l2"', '"the_tool__x_"'))
     with pytest.raises(
         LegFKError, match=r'chains the tool \[x\] and the_tool__x_ do not go'
     ):
         Catalog.load(file).select(['the tool [x]', 'the_tool__x_'])
 
 
-def test_a_tip_given_as_a_chain_is_answered_without_a_table_made(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    file = tmp_path / 'icub.urdf'
-    file.write_text(urdf_text('icub', Catalog.load().select(['left_leg'])))
+def test_a_tip_given_as_a_chain_is_answered_without_a_table_made(written, monkeypatch):
+    file = written(urdf_text('icub', Catalog.load().select(['left_leg'])))
     monkeypatch.delattr('icub_leg_fk.kinematics.urdf_chains.chain_from_urdf')
     with pytest.raises(UnknownNameError, match='left_foot is the tip of left_leg'):
         Catalog.load(file).chain('left_foot')
 
 
-def test_another_root_may_be_named(arm: Path) -> None:
+def test_another_root_may_be_named(arm):
     assert load_chain('l2', file=arm, root='l1').joint_names == ('j1',)
     with pytest.raises(UnknownNameError, match=r"unknown link 'l9' of .*; .*known: l4"):
         Catalog.load(arm, root='l9')
@@ -82,7 +74,7 @@ def test_another_root_may_be_named(arm: Path) -> None:
     assert "is not a URDF; the root link 'base' is ignored" in catalog.warnings[0]
 
 
-def test_what_is_no_chain_says_why(arm: Path) -> None:
+def test_what_is_no_chain_says_why(arm):
     catalog = Catalog.load(arm)
     with pytest.raises(InputFileError, match="joint 'j3' is floating"):
         catalog.chain('l4')
@@ -99,7 +91,7 @@ def test_what_is_no_chain_says_why(arm: Path) -> None:
 
 @needs_robots
 @pytest.mark.parametrize('robot_name', ['iCubGenova04', 'iCubLisboa01', 'iCubNancy01'])
-def test_the_legs_go_by_their_names_with_both_frames(robot_name: str) -> None:
+def test_the_legs_go_by_their_names_with_both_frames(robot_name):
     catalog = icub(robot_name)
     assert (
         list(catalog.chains)[:3]
@@ -125,7 +117,7 @@ def test_the_legs_go_by_their_names_with_both_frames(robot_name: str) -> None:
 
 
 @needs_robots
-def test_an_icub_3_has_only_its_soles() -> None:
+def test_an_icub_3_has_only_its_soles():
     catalog = icub('iCubGenova09')
     leg = catalog.chain('left_leg')
     assert (leg.frame, leg.frame_id, leg.tip) == ('sole', 'l_sole', 'left_foot')
@@ -138,20 +130,16 @@ def test_an_icub_3_has_only_its_soles() -> None:
 
 
 @needs_robots
-def test_a_root_that_is_not_the_shipped_one_has_no_shipped_chains() -> None:
-    file = SHARED / 'data' / 'urdf' / 'iCubGenova04.urdf'
-    catalog = Catalog.load(file, root='l_hip_1')
+def test_a_root_that_is_not_the_shipped_one_has_no_shipped_chains():
+    catalog = icub('iCubGenova04', root='l_hip_1')
     assert not catalog.known() and 'left_leg' not in catalog.chains
     assert catalog.chain('l_sole').n < 6
 
 
 @needs_robots
-def test_tables_are_tidied_for_people_on_request() -> None:
-    file = SHARED / 'data' / 'urdf' / 'iCubNancy01.urdf'
-    exact, tidied = (
-        Catalog.load(file, tolerance=tolerance).chain('left_leg')
-        for tolerance in (0.0, TIDY)
-    )
+def test_tables_are_tidied_for_people_on_request():
+    exact = icub('iCubNancy01').chain('left_leg')
+    tidied = icub('iCubNancy01', tolerance=TIDY).chain('left_leg')
     offsets = np.degrees([link.offset for link in tidied.links])
     assert offsets == pytest.approx([0, 90, -90, 90, 0, 0], abs=1e-12)
     assert (
@@ -160,7 +148,7 @@ def test_tables_are_tidied_for_people_on_request() -> None:
 
 
 @needs_robots
-def test_a_catalog_of_a_urdf_is_a_value() -> None:
+def test_a_catalog_of_a_urdf_is_a_value():
     catalog = icub('iCubGenova04')
     again = pickle.loads(pickle.dumps(catalog))
     assert again == catalog and again.chain('l_sole') == catalog.chain('l_sole')
@@ -169,9 +157,8 @@ def test_a_catalog_of_a_urdf_is_a_value() -> None:
     )
 
 
-def test_degrees_in_a_urdf_are_computed_and_reported(tmp_path: Path) -> None:
-    file = tmp_path / 'arm.urdf'
-    file.write_text(
+def test_degrees_in_a_urdf_are_computed_and_reported(written):
+    file = written(
         robot([joint(0, rpy='-90 0 0'), joint(1)])
         .replace('"-2"', '"-180"')
         .replace('"2"', '"180"')
@@ -192,6 +179,6 @@ def test_degrees_in_a_urdf_are_computed_and_reported(tmp_path: Path) -> None:
 
 
 @needs_robots
-def test_no_real_robot_is_doubted() -> None:
-    for file in (SHARED / 'data' / 'urdf').glob('*.urdf'):
+def test_no_real_robot_is_doubted():
+    for file in URDFS.glob('*.urdf'):
         assert Catalog.load(file).warnings == ()

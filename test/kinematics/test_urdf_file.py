@@ -1,11 +1,9 @@
 """A URDF read and made a table: on every robot there is beside Pinocchio, and on random ones."""
 
-from collections.abc import Sequence
 from functools import cache, partial
 import importlib.util
 from pathlib import Path
 import sys
-from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -22,7 +20,7 @@ EXACT = 1e-9  # m and rad
 
 
 @cache
-def robots() -> list[Path]:
+def robots():
     """Return the URDFs of example-robot-data, which pip installs beside Pinocchio."""
     found = importlib.util.find_spec('pinocchio')
     folders = Path(found.origin).parents if found and found.origin else ()
@@ -33,7 +31,7 @@ def robots() -> list[Path]:
 
 
 @cache
-def icubs() -> list[Path]:
+def icubs():
     """Return the URDFs of icub-models, and those beside the project."""
     installed = Path(sys.prefix, 'share', 'iCub', 'robots')
     return [*sorted(installed.glob('*/model.urdf')), *sorted(SHARED.glob('*.urdf'))]
@@ -42,11 +40,11 @@ def icubs() -> list[Path]:
 class Robot:
     """A URDF in Pinocchio."""
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text):
         self.pin = pytest.importorskip('pinocchio')
         try:
             self.model = self.pin.buildModelFromXML(text, mimic=True)
-            self.mimics: dict[str, Any] = {}
+            self.mimics = {}
         except (
             ValueError
         ):  # a joint that mimics one that is not there, which we give it by hand
@@ -54,14 +52,12 @@ class Robot:
             self.mimics = {joint.name: joint.texts for joint in load(text).joints}
         self.data = self.model.createData()
 
-    def forward(
-        self, root: str, tip: str, names: Sequence[str], Q: np.ndarray
-    ) -> np.ndarray:
+    def forward(self, root, tip, names, Q):
         return np.array(
             [self._pose(root, tip, dict(zip(names, row, strict=True))) for row in Q]
         )
 
-    def _pose(self, root: str, tip: str, positions: dict[str, float]) -> np.ndarray:
+    def _pose(self, root, tip, positions):
         q = self.pin.neutral(self.model)
         for name, texts in self.mimics.items():
             if ('mimic', 'joint') in texts:
@@ -83,13 +79,13 @@ class Robot:
 
 
 @cache
-def pinocchio_robot(file: Path) -> Robot:
+def pinocchio_robot(file):
     return Robot(
         file.read_text().replace('<robot>', '<robot name="unnamed">')
     )  # it wants one
 
 
-def check(file: Path, urdf: Urdf, oracle: Robot, tip: str) -> None:
+def check(file, urdf, oracle, tip):
     """Check a chain in both conventions, and that none of its numbers is large."""
     root = urdf.root()
     chain = chain_from_urdf(urdf, root, tip)
@@ -101,11 +97,11 @@ def check(file: Path, urdf: Urdf, oracle: Robot, tip: str) -> None:
             file,
             tip,
         )
-    assert max(max(abs(link.a), abs(link.d)) for link in chain.links) < 10, (file, tip)
+    assert longest(chain) < 10, (file, tip)
 
 
 @pytest.mark.parametrize('tip', ['l_sole', 'r_foot_dh_frame', 'imu_frame', 'l_hand'])
-def test_the_chains_of_the_icubs_are_pinocchios(tip: str) -> None:
+def test_the_chains_of_the_icubs_are_pinocchios(tip):
     if not icubs():
         pytest.skip('icub-models is not installed, and ../shared is not there')
     for file in icubs():
@@ -114,7 +110,7 @@ def test_the_chains_of_the_icubs_are_pinocchios(tip: str) -> None:
             check(file, urdf, pinocchio_robot(file), tip)
 
 
-def test_every_chain_of_every_example_robot_is_pinocchios() -> None:
+def test_every_chain_of_every_example_robot_is_pinocchios():
     if not robots():
         pytest.skip('example-robot-data is not installed')
     done, refused = 0, []
@@ -140,8 +136,18 @@ def test_every_chain_of_every_example_robot_is_pinocchios() -> None:
         ), fault
 
 
-def load(text: str) -> Urdf:
+def load(text):
     return Urdf.parse(text.encode(), 'robot.urdf')
+
+
+def table(*joints):
+    """Return the chain that some joints make, from the first link to the last."""
+    return chain_from_urdf(load(robot(joints)), 'l0', f'l{len(joints)}')
+
+
+def longest(chain):
+    """Return the largest a or d of a chain [m]."""
+    return max(max(abs(link.a), abs(link.d)) for link in chain.links)
 
 
 NUMBERS = st.one_of(st.sampled_from([0.0, 0.1, -0.25]), st.floats(-0.5, 0.5))
@@ -163,7 +169,7 @@ GAINS = st.sampled_from([1.0, -1.0, 0.5, 0.0])
 
 
 @st.composite
-def random_robots(draw: st.DrawFn) -> str:
+def random_robots(draw):
     kinds = draw(
         st.lists(
             st.sampled_from(['revolute', 'continuous', 'prismatic', 'fixed']),
@@ -173,7 +179,7 @@ def random_robots(draw: st.DrawFn) -> str:
     )
     kinds[draw(st.integers(0, len(kinds) - 1))] = 'revolute'
 
-    def triple(values: st.SearchStrategy) -> str:
+    def triple(values):
         return ' '.join(repr(draw(values)) for _ in range(3))
 
     joints = []
@@ -188,9 +194,7 @@ def random_robots(draw: st.DrawFn) -> str:
 
 
 @given(random_robots())
-def test_any_robot_is_its_urdf_multiplied_out_and_never_kilometres_long(
-    text: str,
-) -> None:
+def test_any_robot_is_its_urdf_multiplied_out_and_never_kilometres_long(text):
     urdf = load(text)
     root, tip = 'l0', urdf.links[-1]
     try:
@@ -204,12 +208,11 @@ def test_any_robot_is_its_urdf_multiplied_out_and_never_kilometres_long(
     for chain in (exact, as_modified(exact)):
         assert np.abs(chain.forward(positions) - expected).max() < EXACT
     assert np.abs(tidied.forward(positions) - expected).max() < 100 * TIDY
-    for link in (*exact.links, *tidied.links):
-        assert max(abs(link.a), abs(link.d)) < 10
+    assert max(longest(exact), longest(tidied)) < 10
 
 
 @given(random_robots())
-def test_any_robot_is_pinocchios(text: str) -> None:
+def test_any_robot_is_pinocchios(text):
     urdf, tip = load(text), f'l{text.count("<joint")}'
     try:
         chain = chain_from_urdf(urdf, 'l0', tip)
@@ -220,7 +223,7 @@ def test_any_robot_is_pinocchios(text: str) -> None:
     assert np.abs(chain.forward(Q) - expected).max() < EXACT
 
 
-def test_axes_that_truly_are_a_little_apart_get_a_fixed_row() -> None:
+def test_axes_that_truly_are_a_little_apart_get_a_fixed_row():
     """A calibrated UR5 gets d = 574 m from its maker's tool."""
     urdf = load(
         robot(
@@ -233,14 +236,14 @@ def test_axes_that_truly_are_a_little_apart_get_a_fixed_row() -> None:
     )
     chain = chain_from_urdf(urdf, 'l0', 'l3', tolerance=TIDY)
     assert [link.joint_type for link in chain.links].count('fixed') == 2
-    assert max(max(abs(link.a), abs(link.d)) for link in chain.links) < 1
+    assert longest(chain) < 1
     found = difference(
         chain.forward, partial(urdf.forward, 'l0', 'l3'), postures(chain, 50)
     )
     assert max(found) < 1e-6  # mm and deg
 
 
-def test_a_tidied_table_has_right_angles_parallel_axes_and_no_nanometres() -> None:
+def test_a_tidied_table_has_right_angles_parallel_axes_and_no_nanometres():
     urdf = load(
         robot(
             [
@@ -267,44 +270,38 @@ def test_a_tidied_table_has_right_angles_parallel_axes_and_no_nanometres() -> No
     assert max(difference(exact.forward, tidied.forward, at_zero)) < 1e-9
 
 
-def test_opposed_parallel_axes_are_told_from_equal_ones() -> None:
+def test_opposed_parallel_axes_are_told_from_equal_ones():
     """In OpenRAVE they are not (its issue 366)."""
-    urdf = load(
-        robot(
-            [joint(0), joint(1, xyz='0.3 0 0', axis='0 0 -1'), joint(2, xyz='0.3 0 0')]
-        )
-    )
-    chain = chain_from_urdf(urdf, 'l0', 'l3')
+    opposed = joint(1, xyz='0.3 0 0', axis='0 0 -1')
+    chain = table(joint(0), opposed, joint(2, xyz='0.3 0 0'))
     assert np.degrees([link.alpha for link in chain.links[:2]]) == pytest.approx(
         [180, 180]
     )
     assert chain.forward([0.3, 0.3, 0.0])[:3, :3] == pytest.approx(np.eye(3), abs=1e-15)
 
 
-def test_a_joint_without_bounds_has_no_range() -> None:
+def test_a_joint_without_bounds_has_no_range():
     bounds = 'lower="-2" upper="2" '
-    chain = chain_from_urdf(
-        load(robot([joint(0).replace(bounds, ''), joint(1)])), 'l0', 'l2'
-    )
+    chain = table(joint(0).replace(bounds, ''), joint(1))
     assert chain.lower == pytest.approx([-np.inf, -2])
     assert chain.upper == pytest.approx([np.inf, 2])
     one = joint(0).replace('lower="-2" ', '')  # of which the default is 0
-    assert chain_from_urdf(load(robot([one])), 'l0', 'l1').lower == pytest.approx([0])
+    assert table(one).lower == pytest.approx([0])
 
 
-def test_what_is_not_on_the_way_may_be_nonsense() -> None:
+def test_what_is_not_on_the_way_may_be_nonsense():
     eye = joint(0, axis='0 0 0', xyz='a b c').replace('j0', 'pan').replace('l1', 'eye')
     text = robot([joint(0), eye.replace('lower="-2"', 'lower="3"'), joint(1)])
     assert chain_from_urdf(load(text), 'l0', 'l2').joint_names == ('j0', 'j1')
 
 
-def test_an_origin_may_have_a_quaternion() -> None:
+def test_an_origin_may_have_a_quaternion():
     turned = joint(0, xyz='0.1 0 0').replace('rpy="0 0 0"', 'quat_xyzw="0 2 0 2"')
-    chain = chain_from_urdf(load(robot([turned, joint(1, xyz='0 0 0.3')])), 'l0', 'l2')
+    chain = table(turned, joint(1, xyz='0 0 0.3'))
     assert chain.forward([0, 0])[:3, 3] == pytest.approx([0.4, 0, 0])
 
 
-def test_rows_follow_what_a_joint_mimics_even_by_another() -> None:
+def test_rows_follow_what_a_joint_mimics_even_by_another():
     first, last = joint(0), joint(4, xyz='0.1 0 0')
     follower = joint(
         1, xyz='0.2 0 0', more='<mimic joint="j2" multiplier="2" offset="0.1"/>'
@@ -315,8 +312,7 @@ def test_rows_follow_what_a_joint_mimics_even_by_another() -> None:
     still = joint(
         3, 'prismatic', more='<mimic joint="j0" multiplier="0" offset="0.7"/>'
     )
-    urdf = load(robot([first, follower, middle, still, last]))
-    chain = chain_from_urdf(urdf, 'l0', 'l5')
+    chain = table(first, follower, middle, still, last)
     assert chain.joint_names == ('j0', 'j4')
     assert [(row.joint, row.link.gain) for row in chain.rows()] == [
         ('j0', 1),
@@ -337,21 +333,19 @@ def test_rows_follow_what_a_joint_mimics_even_by_another() -> None:
         )
 
 
-def test_every_repr_fits_a_line() -> None:
+def test_every_repr_fits_a_line():
     urdf = load(robot([joint(0)]).replace('j0', 'j' * 200))
     for thing in (urdf, urdf.joints[0], urdf.path('l0', 'l1')[0]):
         assert len(repr(thing)) < 99
 
 
-def test_a_joint_may_follow_one_that_only_messages_have() -> None:
+def test_a_joint_may_follow_one_that_only_messages_have():
     """As robot_state_publisher moves it."""
-    chain = chain_from_urdf(
-        load(robot([joint(0, more='<mimic joint="elsewhere"/>'), joint(1)])), 'l0', 'l2'
-    )
+    chain = table(joint(0, more='<mimic joint="elsewhere"/>'), joint(1))
     assert chain.joint_names == ('elsewhere', 'j1') and chain.upper[0] == np.inf
 
 
-def test_a_root_may_hang_beside_the_chain_by_fixed_joints() -> None:
+def test_a_root_may_hang_beside_the_chain_by_fixed_joints():
     """As UR's `base`."""
     base = (
         '<link name="base"/><joint name="b" type="fixed"><parent link="l0"/>'
@@ -367,7 +361,7 @@ def test_a_root_may_hang_beside_the_chain_by_fixed_joints() -> None:
         chain_from_urdf(urdf, 'l1', 'base')
 
 
-def test_an_unknown_link_lists_the_links_at_the_ends() -> None:
+def test_an_unknown_link_lists_the_links_at_the_ends():
     urdf = load(robot([joint(0), joint(1)]).replace('"l1"', '"the_elbow"'))
     with pytest.raises(UnknownNameError) as error:
         chain_from_urdf(urdf, 'l0', 'elbow')
@@ -379,7 +373,7 @@ def test_an_unknown_link_lists_the_links_at_the_ends() -> None:
 
 
 # What is said, the URDF or its joints, and from where to where if not from l0 to l1.
-REFUSED: list[Any] = [
+REFUSED = [
     ("link 'l0' is not below 'l1', and joint 'j0' a", [joint(0)], 'l1', 'l0'),
     (
         "'l1' is not below 'l2'; above it is 'l0'",
@@ -452,7 +446,7 @@ REFUSED: list[Any] = [
 
 
 @pytest.mark.parametrize('row', REFUSED, ids=[row[0] for row in REFUSED])
-def test_what_is_no_table_is_refused_in_one_line_by_name(row: tuple[Any, ...]) -> None:
+def test_what_is_no_table_is_refused_in_one_line_by_name(row):
     words, given, *ends = row
     text = given if isinstance(given, str) else robot(given)
     root, tip = ends or ('l0', 'l1')

@@ -1,7 +1,5 @@
 """XML as robot_state_publisher reads it: what it forgives is read as it does, or refused."""
 
-from pathlib import Path
-
 from icub_leg_fk.errors import InputFileError
 from icub_leg_fk.kinematics import Catalog, Urdf
 import pytest
@@ -92,31 +90,31 @@ REFUSED = {
 }
 
 
-def parse(text: str) -> Urdf:
+def parse(text):
     return Urdf.parse(text.encode('utf-8', 'surrogateescape'), 'robot.urdf')
 
 
-def pinocchio_links(text: str) -> list[str]:
+def pinocchio_links(text):
     pin = pytest.importorskip('pinocchio')
     model = pin.buildModelFromXML(text)
     return [frame.name for frame in model.frames if frame.type == pin.FrameType.BODY]
 
 
 @pytest.mark.parametrize('kind', FORGIVEN)
-def test_what_urdfdom_forgives_is_read_as_it_is_meant(kind: str) -> None:
+def test_what_urdfdom_forgives_is_read_as_it_is_meant(kind):
     assert parse(FORGIVEN[kind]) == parse(PLAIN)
     if '\udcb0' not in FORGIVEN[kind]:  # which Python's binding cannot take
         assert pinocchio_links(FORGIVEN[kind].lstrip('\ufeff')) == ['l0', 'l1', 'l2']
 
 
 @pytest.mark.parametrize('name', NAMES)
-def test_names_are_those_that_pinocchio_reads(name: str) -> None:
+def test_names_are_those_that_pinocchio_reads(name):
     text = PLAIN.replace('"l1"', f'"{name}"')
     assert [*parse(text).links] == pinocchio_links(text)
 
 
 @pytest.mark.parametrize('kind', REFUSED)
-def test_what_lxml_would_have_to_guess_is_refused_with_its_line(kind: str) -> None:
+def test_what_lxml_would_have_to_guess_is_refused_with_its_line(kind):
     text, words = REFUSED[kind]
     with pytest.raises(InputFileError) as refusal:
         parse(text)
@@ -127,25 +125,20 @@ def test_what_lxml_would_have_to_guess_is_refused_with_its_line(kind: str) -> No
 @pytest.mark.parametrize(
     'around', ['String value is: {}\n', '{}\n---\n', 'data: {}\n---\n']
 )
-def test_what_ros_2_prints_of_a_description_is_read(
-    around: str, tmp_path: Path
-) -> None:
+def test_what_ros_2_prints_of_a_description_is_read(around, written):
     text = PLAIN.replace('><', '>\n  <')
     shown = (
         yaml.safe_dump(text, width=10**6).rstrip('.\n') if 'data' in around else text
     )
     assert parse(around.format(shown)) == parse(PLAIN)
-    file = tmp_path / 'description.txt'
-    file.write_text(around.format(shown))
+    file = written(around.format(shown))
     assert Catalog.load(file).chain('l2').version == 'urdf'
 
 
-def test_a_description_that_ros_2_has_cut_off_is_refused_with_the_way(
-    tmp_path: Path,
-) -> None:
-    file = tmp_path / 'description.txt'
+def test_a_description_that_ros_2_has_cut_off_is_refused_with_the_way(written):
     for start in ('', '<?xml version="1.0" ?>\n<!-- ' + 'made by xacro ' * 20 + '-->'):
-        file.write_text(f'data: {yaml.safe_dump((start + PLAIN)[:128] + "...")}---\n')
+        shown = yaml.safe_dump((start + PLAIN)[:128] + '...')
+        file = written(f'data: {shown}---\n')
         with pytest.raises(
             InputFileError, match=r'is cut off; .* --full-length /robot_descr'
         ):

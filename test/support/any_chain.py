@@ -1,6 +1,5 @@
 """Any chain for hypothesis: random tables, joint types and gains, right angles, odd twists."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from math import pi
 
@@ -30,7 +29,7 @@ ANGLES = st.one_of(
 GAINS = st.sampled_from([1.0, 1.0, -1.0, 0.5, -2.0])
 
 
-def links(joint_types: Sequence[str]) -> st.SearchStrategy[DHLink]:
+def links(joint_types):
     return st.builds(
         DHLink,
         a=LENGTHS,
@@ -46,7 +45,7 @@ LINKS = links(['revolute', 'revolute', 'prismatic', 'fixed'])
 
 
 @st.composite
-def transforms(draw: st.DrawFn) -> np.ndarray:
+def transforms(draw):
     quaternion = np.array([draw(ANGLES) for _ in range(4)])
     length = np.linalg.norm(quaternion)
     T = np.eye(4)
@@ -56,12 +55,7 @@ def transforms(draw: st.DrawFn) -> np.ndarray:
     return T
 
 
-def chain_of(
-    links: Sequence[DHLink],
-    T_root_0: np.ndarray | None = None,
-    T_n_tip: np.ndarray | None = None,
-    joint_names: Sequence[str] = (),
-) -> Chain:
+def chain_of(links, T_root_0=None, T_n_tip=None, joint_names=()):
     moving = [i for i, link in enumerate(links) if link.joint_type != 'fixed']
     return Chain(
         name='any',
@@ -76,7 +70,7 @@ def chain_of(
 
 
 @st.composite
-def row_lists(draw: st.DrawFn) -> list[DHLink]:
+def row_lists(draw):
     """Return up to seven rows, at least one of them with a joint."""
     rows = draw(st.lists(LINKS, max_size=6))
     rows.insert(draw(st.integers(0, len(rows))), draw(links(['revolute', 'prismatic'])))
@@ -84,7 +78,7 @@ def row_lists(draw: st.DrawFn) -> list[DHLink]:
 
 
 @st.composite
-def rows_that_follow(draw: st.DrawFn) -> tuple[list[DHLink], list[str]]:
+def rows_that_follow(draw):
     """Return rows that name their joints, and the joints: several a joint, in any order."""
     rows = draw(row_lists())
     moving = [i for i, row in enumerate(rows) if row.joint_type != 'fixed']
@@ -111,9 +105,7 @@ CHAINS = st.one_of(IN_ORDER, FOLLOWING)
 
 
 @st.composite
-def chains_and_positions(
-    draw: st.DrawFn, chains: st.SearchStrategy[Chain] = CHAINS
-) -> tuple[Chain, list[list[float]]]:
+def chains_and_positions(draw, chains=CHAINS):
     chain = draw(chains)
     q = st.lists(ANGLES, min_size=chain.n, max_size=chain.n)
     return chain, draw(st.lists(q, min_size=1, max_size=3))

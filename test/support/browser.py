@@ -1,10 +1,8 @@
 """A real browser for tests of pages: headless Chromium, driven by Playwright."""
 
-from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import shutil
 import time
-from typing import Any
 
 import pytest
 
@@ -21,7 +19,7 @@ _TIMEOUT = 20.0  # s; software draws slowly on a busy machine
 
 
 @contextmanager
-def running_tab() -> Iterator[Any]:
+def running_tab():
     """Run Chromium with one tab, or skip the test with what is missing."""
     playwright = pytest.importorskip('playwright.sync_api')
     programs = [program for program in map(shutil.which, _PROGRAMS) if program]
@@ -35,7 +33,7 @@ def running_tab() -> Iterator[Any]:
         browser.close()
 
 
-def show_page(tab: Any, address: str) -> Any:
+def show_page(tab, address):
     """Let a tab show a page of viser, if it does not yet, and return it."""
     if not tab.url.startswith(address):
         tab.goto(
@@ -45,18 +43,18 @@ def show_page(tab: Any, address: str) -> Any:
     return tab
 
 
-def slider(page: Any, name: str) -> Any:
+def slider(page, name):
     """Return the slider that has a name as its label."""
     label = page.locator('label').get_by_text(name, exact=True)
     return page.locator(f'[id="{label.get_attribute("for")}"]').get_by_role('slider')
 
 
-def copied_texts(page: Any) -> list[str]:
+def copied_texts(page):
     """Return the texts of a page that can be copied."""
     return page.locator('pre').all_inner_texts()
 
 
-def wait_until(page: Any, is_so: Callable[[], bool]) -> None:
+def wait_until(page, is_so):
     """Wait for something to be so in a page."""
     deadline = time.monotonic() + _TIMEOUT
     while not is_so():
@@ -64,11 +62,11 @@ def wait_until(page: Any, is_so: Callable[[], bool]) -> None:
         page.wait_for_timeout(50)
 
 
-def still_picture(page: Any, other_than: bytes = b'') -> bytes:
+def still_picture(page, other_than=b''):
     """Return a picture of the scene once it has settled and differs from another."""
     pictures = [b'', b'']
 
-    def has_settled() -> bool:
+    def has_settled():
         pictures[0], pictures[1] = pictures[1], page.screenshot(clip=_SCENE)
         return pictures[0] == pictures[1] != other_than
 

@@ -4,11 +4,8 @@ The numbers are typed in from the documents, and each model is put together from
 translations about the axes; nothing here is shared with the code under test.
 """
 
-from collections.abc import Sequence
 from math import cos, sin
-from typing import Any
 
-from icub_leg_fk.kinematics import Chain
 import numpy as np
 
 # Chain, version, a [mm], d [mm], alpha [deg], offset [deg], as printed; a line per row. Version 3
@@ -90,7 +87,7 @@ CASES = [
 ]
 
 
-def table(name: str, version: str) -> list[list[float]]:
+def table(name, version):
     """Return a row of a, d [m], alpha, offset [rad] for each printed one."""
     rows = []
     for line in PRINTED.split('\n')[1:-1]:
@@ -101,7 +98,7 @@ def table(name: str, version: str) -> list[list[float]]:
     return rows
 
 
-def transform(text: str) -> np.ndarray:
+def transform(text):
     """Return the (4, 4) transform of three rows in mm."""
     T = np.eye(4)
     T[:3] = np.array(text.split(), float).reshape(3, 4)
@@ -109,7 +106,7 @@ def transform(text: str) -> np.ndarray:
     return T
 
 
-def after_table(name: str, version: str, frame: str) -> np.ndarray:
+def after_table(name, version, frame):
     """Return the transform from a tip frame to the last row's frame."""
     T_n_tip = transform(ENDS.get((name, version), IDENTITY))
     if frame != 'sole':
@@ -120,7 +117,7 @@ def after_table(name: str, version: str, frame: str) -> np.ndarray:
 class PinocchioArm:
     """A printed table as a Pinocchio model: joints about z at fixed placements."""
 
-    def __init__(self, name: str, version: str, frame: str) -> None:
+    def __init__(self, name, version, frame):
         import pinocchio as pin
 
         self.pin, self.model = pin, pin.Model()
@@ -137,32 +134,32 @@ class PinocchioArm:
         )
         self.data = self.model.createData()
 
-    def forward(self, q: np.ndarray) -> np.ndarray:
+    def forward(self, q):
         self.pin.framesForwardKinematics(self.model, self.data, q)
         return np.array(self.data.oMf[self.tip].homogeneous)
 
-    def jacobian(self, q: np.ndarray) -> np.ndarray:
+    def jacobian(self, q):
         axes = self.pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         return np.array(
             self.pin.computeFrameJacobian(self.model, self.data, q, self.tip, axes)
         )
 
 
-def translation(x: float, y: float, z: float) -> np.ndarray:
+def translation(x, y, z):
     return np.array([[1, 0, 0, x], [0, 1, 0, y], [0, 0, 1, z], [0, 0, 0, 1.0]])
 
 
-def rotation_x(angle: float) -> np.ndarray:
+def rotation_x(angle):
     c, s = cos(angle), sin(angle)
     return np.array([[1, 0, 0, 0], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1]])
 
 
-def rotation_z(angle: float) -> np.ndarray:
+def rotation_z(angle):
     c, s = cos(angle), sin(angle)
     return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
 
 
-def basic_product(a: float, d: float, alpha: float, theta: float) -> np.ndarray:
+def basic_product(a, d, alpha, theta):
     """Return one link, as the documents define it: Rz(theta) Tz(d) Tx(a) Rx(alpha)."""
     return (
         rotation_z(theta)
@@ -175,19 +172,19 @@ def basic_product(a: float, d: float, alpha: float, theta: float) -> np.ndarray:
 class HandMadeArm:
     """A printed table multiplied out, where Pinocchio is not installed."""
 
-    def __init__(self, name: str, version: str, frame: str) -> None:
+    def __init__(self, name, version, frame):
         self.T_root_0 = transform(ROOTS[name, version])
         self.rows = table(name, version)
         self.after = after_table(name, version, frame)
 
-    def forward(self, q: np.ndarray) -> np.ndarray:
+    def forward(self, q):
         T = self.T_root_0
         for (a, d, alpha, offset), position in zip(self.rows, q, strict=True):
             T = T @ basic_product(a, d, alpha, offset + position)
         return T @ self.after
 
 
-def frames(chain: Chain, q: Sequence[float]) -> list[np.ndarray]:
+def frames(chain, q):
     """Return every frame of any chain, each row as the product of its four basic transforms."""
     positions = dict(zip(chain.joint_names, q, strict=True))
     named = {link.joint for link in chain.links}
@@ -203,7 +200,7 @@ def frames(chain: Chain, q: Sequence[float]) -> list[np.ndarray]:
     return [*found, found[-1] @ chain.T_n_tip]
 
 
-def quaternion_to_matrix(quaternion: Any) -> Any:
+def quaternion_to_matrix(quaternion):
     """Return the (..., 3, 3) rotation matrices of (..., 4) unit quaternions x, y, z, w."""
     x, y, z, w = np.moveaxis(np.asarray(quaternion, dtype=float), -1, 0)
     R = np.empty((*x.shape, 3, 3))
