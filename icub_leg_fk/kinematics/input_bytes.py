@@ -21,11 +21,8 @@ def first_bytes(path: str | Path, most: int) -> bytes:
     try:
         with open(os.fspath(path), 'rb') as stream:
             return stream.read(most)
-    except (
-        OSError,
-        TypeError,
-        ValueError,
-    ) as error:  # also no path, or a zero byte in it
+    # a TypeError for what is no path, a ValueError for a zero byte in it
+    except (OSError, TypeError, ValueError) as error:
         reason = getattr(error, 'strerror', None) or str(error)
         raise CatalogError(
             shown(path), 0, '', reason.lower(), 'a readable file'

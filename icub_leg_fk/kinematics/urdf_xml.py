@@ -75,7 +75,8 @@ def _text(data: bytes, file: str) -> str:
         raise InputFileError(file, 'is not XML: it is UTF-16 text; allowed: UTF-8')
     echoed = _ECHOED.search(data[:start])
     if echoed:  # what stands before it may be a warning, such as of a lost message
-        text = _echoed(data[echoed.start() :], file)
+        first = echoed.start()
+        text = _echoed(data[first:], file)
     else:
         newlines = '\n' * data.count(b'\n', 0, start)
         text = newlines + data[start:].decode('utf-8', 'replace')
