@@ -1,5 +1,6 @@
 """Reading a file that a user has named."""
 
+import os
 from pathlib import Path
 
 from icub_leg_fk.errors import CatalogError
@@ -18,9 +19,10 @@ def first_bytes(path: str | Path, most: int) -> bytes:
         CatalogError: it cannot be read; says why.
     """
     try:
-        with open(path, 'rb') as stream:
+        with open(os.fspath(path), 'rb') as stream:
             return stream.read(most)
-    except (OSError, ValueError) as error:  # a ValueError for a zero byte in the path
+    # a TypeError for what is no path, a ValueError for a zero byte in it
+    except (OSError, TypeError, ValueError) as error:
         reason = getattr(error, 'strerror', None) or str(error)
         raise CatalogError(
             shown(path), 0, '', reason.lower(), 'a readable file'

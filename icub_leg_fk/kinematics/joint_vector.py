@@ -115,7 +115,7 @@ def _values(q: ArrayLike, name: str, allowed: str) -> Array:
 def _type_in_words(q: object) -> str:
     if q is None:
         return 'None'
-    return 'an array' if isinstance(q, np.ndarray) else f'a {type(q).__name__}'
+    return 'an array' if type(q) is np.ndarray else f'a {type(q).__name__}'
 
 
 def _refuse_not_finite(values: Array, name: str) -> None:

@@ -368,13 +368,13 @@ class Urdf:
         passed = [name]
         while name in self._joints_by_name:
             joint = self._joints_by_name[name]
-            if not any(element == 'mimic' for element, _ in joint.texts):
+            if ('mimic', 'joint') not in joint.texts:
                 break
             (multiplier,) = self._numbers(joint, 'mimic', 'multiplier', '1')
             (own_offset,) = self._numbers(joint, 'mimic', 'offset', '0')
             offset += gain * own_offset
             gain *= multiplier
-            name = joint.texts.get(('mimic', 'joint'), '')
+            name = joint.texts['mimic', 'joint']
             if not name:
                 self._fail(f'joint {joint.name!r}: mimic has no joint')
             if name in passed:
@@ -434,6 +434,8 @@ def _joint_element(element: etree._Element) -> JointElement:
             seen.add(name)
             for key, value in part.items():
                 texts[name, key] = value
+    if 'mimic' in seen:  # even one without attributes
+        texts.setdefault(('mimic', 'joint'), '')
     return JointElement(
         element.get('name', ''),
         element.get('type', ''),

@@ -73,8 +73,10 @@ def _text(data: bytes, file: str) -> str:
         _refuse_without_element(data, file)
     if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
         raise InputFileError(file, 'is not XML: it is UTF-16 text; allowed: UTF-8')
-    if _ECHOED.search(data[:start]):
-        text = _echoed(data, file)
+    echoed = _ECHOED.search(data[:start])
+    if echoed:  # what stands before it may be a warning, such as of a lost message
+        first = echoed.start()
+        text = _echoed(data[first:], file)
     else:
         newlines = '\n' * data.count(b'\n', 0, start)
         text = newlines + data[start:].decode('utf-8', 'replace')

@@ -440,6 +440,7 @@ def _refuse_other_than_cdr(path: Path, encodings: Mapping[str, str]) -> None:
 def _refuse_odd_metadata(path: Path, reader: Any) -> None:
     """Refuse values in metadata.yaml that rosbags takes as they are, but are of no use."""
     counts = [each.msgcount for each in reader.connections]
+    counts.append(reader.message_count)
     is_usable = isinstance(reader.storage.metadata.custom or {}, dict)
     if not is_usable or not all(isinstance(count, int) for count in counts):
         raise _unreadable(path, ValueError(f'{METADATA} has values of the wrong type'))

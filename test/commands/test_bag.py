@@ -599,6 +599,7 @@ def test_damage_and_missing_files_end_in_one_line_with_what_mends_them(storage, 
     ('old', 'new', 'words'),
     [
         ('message_count: 5', 'message_count: five', 'has values of the wrong type'),
+        ('\n  message_count: 5', '\n  message_count: five', 'values of the wrong type'),
         ('custom_data:', 'custom_data: text\n  more:', 'has values of the wrong type'),
         (
             'version: 9',

@@ -595,6 +595,7 @@ def test_a_file_that_cannot_be_read_says_why(tmp_path):
     missing = tmp_path / 'missing.yaml'
     assert str(refusal(missing)) == f'cannot read {missing}: no such file or directory'
     assert str(refusal(tmp_path)) == f'cannot read {tmp_path}: is a directory'
+    assert str(refusal(0)).startswith('cannot read 0: ')
     assert str(refusal(Path('a\0b'))).endswith('embedded null byte')
     assert str(refusal(Path('two\nlines'))).startswith(
         r"cannot read 'two\nlines': no such file"

@@ -391,6 +391,7 @@ REFUSED = [
         'l2',
     ),
     ("joint 'j0': mimic has no joint", [joint(0, more='<mimic multiplier="2"/>')]),
+    ("joint 'j0': mimic has no joint", [joint(0, more='<mimic/>')]),
     ('origin has rpy and quat_xyzw', [joint(0, rpy='0 0 0" quat_xyzw="0 0 0 1')]),
     ('quat_xyzw is 0 0 0 0', [joint(0).replace('rpy="0 0 0"', 'quat_xyzw="0 0 0 0"')]),
     ("joint 'j0' is screw; allowed", [joint(0, 'screw')]),

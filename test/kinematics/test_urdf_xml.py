@@ -123,7 +123,13 @@ def test_what_lxml_would_have_to_guess_is_refused_with_its_line(kind):
 
 
 @pytest.mark.parametrize(
-    'around', ['String value is: {}\n', '{}\n---\n', 'data: {}\n---\n']
+    'around',
+    [
+        'String value is: {}\n',
+        '{}\n---\n',
+        'data: {}\n---\n',
+        'A message was lost!!!\n\ttotal count change:1\ndata: {}\n---\n',
+    ],
 )
 def test_what_ros_2_prints_of_a_description_is_read(around, written):
     text = PLAIN.replace('><', '>\n  <')
