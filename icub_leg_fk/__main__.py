@@ -96,21 +96,21 @@ def _run(words: list[str]) -> int:
 
 def parse(words: list[str]) -> argparse.Namespace:
     """Return what the words of the command mean; `run` is what carries it out."""
-    parser, parsers = _parsers(words)
-    command = words[0] if words else '-h'
-    if command in parsers:
-        parsers[command].refuse_unknown_options(words[1:])
-        return parsers[command].parse_intermixed_args(
-            words[1:]
-        )  # as in: bag IN --twist OUT
+    command, *rest = words or ['-h']
+    if command in COMMANDS:
+        parser = Parser(prog=f'leg_fk {command}', description=COMMANDS[command])
+        _add_options(parser, command)
+        parser.refuse_unknown_options(rest)
+        return parser.parse_intermixed_args(rest)  # as in: bag IN --twist OUT
     if not command.startswith('-'):
         raise UnknownNameError('command', command, COMMANDS, 'leg_fk -h explains them')
+    parser, _ = _parsers()
     parser.refuse_unknown_options(words)
-    return parser.parse_args([command, *words[1:]])
+    return parser.parse_args([command, *rest])
 
 
-def _parsers(words: Sequence[str]) -> tuple[Parser, dict[str, Parser]]:
-    """Return the command's parser, and its subcommands'; only the one asked for has options."""
+def _parsers() -> tuple[Parser, dict[str, Parser]]:
+    """Return the command's parser, and its subcommands', which have no options yet."""
     parser = Parser(
         prog='leg_fk',
         usage='leg_fk COMMAND ...',
@@ -122,20 +122,25 @@ def _parsers(words: Sequence[str]) -> tuple[Parser, dict[str, Parser]]:
         title='commands', metavar='COMMAND', required=True, prog='leg_fk'
     )
     for name, purpose in COMMANDS.items():
-        subparser = subparsers.add_parser(name, help=purpose, description=purpose)
-        if name in words[:1]:
-            module = import_module(f'icub_leg_fk.commands.{name}')
-            subparser.epilog = module.EXAMPLES
-            module.add_arguments(subparser)
-            subparser.set_defaults(run=module.run)
+        subparsers.add_parser(name, help=purpose, description=purpose)
     return parser, subparsers.choices
+
+
+def _add_options(parser: Parser, command: str) -> None:
+    module = import_module(f'icub_leg_fk.commands.{command}')
+    parser.epilog = module.EXAMPLES
+    module.add_arguments(parser)
+    parser.set_defaults(run=module.run)
 
 
 def _complete(line: str) -> None:
     """Offer the shell what may follow, and end the process."""
     from argcomplete import autocomplete  # which has had the shell set the variables
 
-    parser, _ = _parsers(line.split()[1:])
+    parser, parsers = _parsers()
+    for command in line.split()[1:2]:
+        if command in parsers:
+            _add_options(parsers[command], command)
     autocomplete(parser)
 
 

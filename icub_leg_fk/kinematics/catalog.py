@@ -262,9 +262,11 @@ def config_file(name: str) -> Path:
         CatalogError: it is in none of these places; lists them.
     """
     package = Path(__file__).parents[1]
-    prefixes = [*package.parents, Path(sys.prefix), Path(sysconfig.get_path('data'))]
-    shares = [prefix / 'share' / PACKAGE / 'config' for prefix in prefixes]
-    places = [package.parent / 'config', *dict.fromkeys(shares)]
+    places = [package.parent / 'config']
+    if not (places[0] / name).is_file():
+        data = Path(sysconfig.get_path('data'))  # which takes a start 1 ms
+        prefixes = dict.fromkeys([*package.parents, Path(sys.prefix), data])
+        places += [prefix / 'share' / PACKAGE / 'config' for prefix in prefixes]
     for place in places:
         if (place / name).is_file():
             return place / name

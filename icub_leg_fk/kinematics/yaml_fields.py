@@ -9,13 +9,12 @@ that it names.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 import math
 from pathlib import Path
 import re
 import reprlib
 from types import MappingProxyType
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NamedTuple, NoReturn, TypeVar
 
 from icub_leg_fk.errors import CatalogError, closest
 from icub_leg_fk.kinematics.input_bytes import first_bytes, shown
@@ -33,8 +32,7 @@ _NUMBER = re.compile(r'[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]{1,3})?')
 _PI = re.compile(r'([-+]?)(?:([0-9]{1,3}) ?\* ?)?pi(?: ?/ ?([1-9][0-9]{0,2}))?')
 
 
-@dataclass(frozen=True)
-class TextKind:
+class TextKind(NamedTuple):
     """What a text in the file has to look like: a pattern, and how to say it."""
 
     pattern: re.Pattern[str]
@@ -56,8 +54,7 @@ _short = reprlib.Repr()
 _short.maxstring = 60
 
 
-@dataclass(frozen=True)
-class Field:
+class Field(NamedTuple):
     """A node of the file together with the words for where it stands."""
 
     file: str

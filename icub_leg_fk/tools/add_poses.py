@@ -7,12 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 import os
 from pathlib import Path
 import re
 import time
-from typing import Any
+from typing import Any, NamedTuple
 
 from icub_leg_fk.errors import (
     InputFileError,
@@ -71,8 +70,7 @@ _NAMESPACE = re.compile(r'/?([A-Za-z_]\w*(/[A-Za-z_]\w*)*/?)?', re.ASCII)
 _UNKNOWN_HASH = f'RIHS01_{"0" * 64}'
 
 
-@dataclass(frozen=True)
-class Summary:
+class Summary(NamedTuple):
     """What has been done with one recording.
 
     Attributes:

@@ -12,7 +12,6 @@ from itertools import islice, pairwise
 import math
 from pathlib import Path
 import re
-import statistics
 from typing import NamedTuple
 
 from icub_leg_fk.errors import InputFileError
@@ -174,7 +173,7 @@ class CsvFile(Part):
         steps = [after - before for before, after in pairwise(times) if after > before]
         if not steps:
             return
-        step = statistics.median(steps) * self._factor
+        step = sorted(steps)[len(steps) // 2] * self._factor
         shortest, longest = _USUAL_STEPS
         if not shortest <= step <= longest:
             self.notes.append(

@@ -8,11 +8,11 @@ from __future__ import annotations
 from array import array
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager, ExitStack
-from dataclasses import dataclass
 import errno
 import heapq
 from operator import itemgetter
 from pathlib import Path
+from typing import NamedTuple
 
 from icub_leg_fk.errors import InputFileError, LegFKError
 from icub_leg_fk.kinematics import Chain
@@ -247,8 +247,7 @@ def warnings_of(
     return lines
 
 
-@dataclass(frozen=True)
-class JointRecording:
+class JointRecording(NamedTuple):
     """Joint positions over time.
 
     Attributes:
