@@ -317,6 +317,7 @@ class Urdf:
         origin = self._origin(joint)
         if joint.kind == 'fixed':
             return UrdfJoint(joint.name, joint.kind, origin, np.zeros(3))
+        self._check_limit(joint)
         axis, kind = self._axis(joint), MOVING[joint.kind]
         master, gain, offset = self._master(joint)
         if gain == 0.0:  # it stays where it is
@@ -381,6 +382,19 @@ class Urdf:
                 self._fail(f'joint {name!r} mimics itself, by {" and ".join(passed)}')
             passed.append(name)
         return name, gain, offset
+
+    def _check_limit(self, joint: JointElement) -> None:
+        """Refuse a limit that urdfdom, and so robot_state_publisher, refuses."""
+        elements = {element for element, _ in joint.texts}
+        if joint.kind == 'continuous' and 'limit' not in elements:
+            return
+        for key in ('effort', 'velocity'):
+            if ('limit', key) not in joint.texts:
+                self._fail(
+                    f'joint {joint.name!r} has no limit with {key}, which URDF wants of a '
+                    f'{joint.kind} joint; its bounds may be left out'
+                )
+            self._numbers(joint, 'limit', key, '0')
 
     def _limits(self, name: str) -> tuple[float, float]:
         joint = self._joints_by_name.get(name)

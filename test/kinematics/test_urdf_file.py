@@ -3,6 +3,7 @@
 from functools import cache, partial
 import importlib.util
 from pathlib import Path
+import re
 import sys
 
 from hypothesis import given
@@ -437,6 +438,9 @@ REFUSED = [
         'l2',
     ),
     ('is above upper', [joint(0).replace('"-2"', '"3"')]),
+    ("joint 'j0' has no limit with effort", [re.sub('<limit.*?/>', '', joint(0))]),
+    ("joint 'j0' has no limit with velocity", [joint(0).replace('velocity', 'speed')]),
+    ("joint 'j0': limit effort", [joint(0).replace('effort="1"', 'effort="x"')]),
     (
         'is a xacro file',
         '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arg name="a"/></robot>',
