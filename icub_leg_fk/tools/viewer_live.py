@@ -94,7 +94,8 @@ class LiveRobot:
 
     def take_description(self, data: bytes) -> None:
         """Take a serialized String, which is a description of the robot."""
-        self._description = data
+        with self._lock:
+            self._description = data
 
     def add_controls(self, gui: Any, changed: Changed) -> None:
         """Say in the page what moves the chains, and what they are."""
@@ -103,7 +104,8 @@ class LiveRobot:
 
     def step(self) -> list[Posture]:
         """Take in what has come, and return the joints of every chain as they came last."""
-        data, self._description = self._description, None
+        with self._lock:
+            data, self._description = self._description, None
         if data is not None:
             self._use(data)
         with self._lock:
