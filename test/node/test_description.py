@@ -1,6 +1,5 @@
 """The robot's description, sent by another process: computed with, or held against the tables."""
 
-from diagnostic_msgs.msg import DiagnosticStatus
 from icub_leg_fk import load_chain
 from icub_leg_fk.kinematics.difference import postures
 import numpy as np
@@ -16,24 +15,22 @@ from support.described_robots import (
 )
 from support.node_harness import (
     BOTH,
+    ERROR,
     FEET,
     LEFT,
     lines,
     LOSSLESS,
     NodeProcess,
+    OK,
     Robot,
     SECOND,
+    STALE,
+    WARN,
 )
 from support.node_oracle import oracle_pose, pose_matrix
 from support.robots import joint as a_joint
 from support.robots import robot as robot_of
 
-OK, WARN, ERROR, STALE = (
-    DiagnosticStatus.OK,
-    DiagnosticStatus.WARN,
-    DiagnosticStatus.ERROR,
-    DiagnosticStatus.STALE,
-)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 Q = [0.2, 0.1, -0.1, -0.5, -0.3, 0.1, 0.15, 0.05, 0.1, -0.4, -0.2, -0.1]
 CRANE = robot_of([a_joint(0), a_joint(1)])

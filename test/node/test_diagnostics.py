@@ -8,7 +8,7 @@ from itertools import pairwise
 import math
 from statistics import median
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 import pytest
 from rclpy.node import Node
@@ -16,22 +16,20 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from support.node_harness import (
     BOTH,
+    ERROR,
     LEFT,
     lines,
     LOSSLESS,
     nanoseconds,
     NodeProcess,
+    OK,
     RIGHT,
     Robot,
     SECOND,
+    STALE,
+    WARN,
 )
 
-OK, WARN, ERROR, STALE = (
-    DiagnosticStatus.OK,
-    DiagnosticStatus.WARN,
-    DiagnosticStatus.ERROR,
-    DiagnosticStatus.STALE,
-)
 REASONS = (
     'malformed',
     'empty_position',

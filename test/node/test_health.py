@@ -1,6 +1,5 @@
 """Health in memory: each thing is said once, and again only after it has been well in between."""
 
-from diagnostic_msgs.msg import DiagnosticStatus
 from icub_leg_fk.node.health import (
     HealthLog,
     notes_around,
@@ -11,13 +10,7 @@ from icub_leg_fk.node.health import (
 from icub_leg_fk.stream.notes import notes_of
 import pytest
 from support.leg_input import BOTH, LEFT, LegInput, RIGHT
-
-OK, WARN, ERROR, STALE = (
-    DiagnosticStatus.OK,
-    DiagnosticStatus.WARN,
-    DiagnosticStatus.ERROR,
-    DiagnosticStatus.STALE,
-)
+from support.node_harness import ERROR, OK, STALE, WARN
 
 
 class Logger:

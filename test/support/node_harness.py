@@ -16,7 +16,7 @@ import tempfile
 import time
 from typing import NamedTuple
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseStamped
 import rclpy
 from rclpy.context import Context
@@ -35,6 +35,12 @@ RIGHT = tuple(f'r_{joint}' for joint in LEG_JOINTS)
 BOTH = LEFT + RIGHT
 HEAD = ('torso_pitch', 'torso_roll', 'torso_yaw', 'neck_pitch', 'neck_roll', 'neck_yaw')
 FEET = ('left_foot', 'right_foot')
+OK, WARN, ERROR, STALE = (
+    DiagnosticStatus.OK,
+    DiagnosticStatus.WARN,
+    DiagnosticStatus.ERROR,
+    DiagnosticStatus.STALE,
+)
 DEEP = QoSProfile(depth=5000)  # reliable
 
 _numbers = itertools.count(1)
